@@ -1,0 +1,1 @@
+//! The case file, the pipeline that turns it into files, and the command line.

@@ -1,0 +1,3 @@
+//! The `graintrap` command.
+
+fn main() {}

@@ -1,0 +1,36 @@
+//! The seam between ways of knowing a field: the panel sum, the table and closed forms are equals behind it.
+
+use meshes::Vec3;
+
+/// Unit potentials and their gradients at a batch of points.
+///
+/// Entry `point * channels + channel` belongs to that point and channel.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Samples {
+    /// Potential of the channel at 1 V, a pure number (V per V; V per unit strength for sources).
+    pub potential: Vec<f64>,
+    /// Gradient of that potential, 1/m. The field is minus this.
+    pub gradient: Vec<Vec3>,
+}
+
+impl Samples {
+    /// Makes room for `points * channels` entries, all zero.
+    pub fn reset(&mut self, points: usize, channels: usize) {
+        self.potential.clear();
+        self.potential.resize(points * channels, 0.0);
+        self.gradient.clear();
+        self.gradient.resize(points * channels, Vec3::zeros());
+    }
+}
+
+/// Potentials of unit excitations, and their gradients, anywhere in space.
+pub trait BasisField: Send + Sync {
+    /// How many channels there are.
+    fn channels(&self) -> usize;
+
+    /// Potential and gradient of every channel at every point (m), into `samples`, whatever it held before.
+    ///
+    /// Whoever calls splits the work between threads; an implementation runs on the calling thread only, and its answer
+    /// for a point does not depend on the other points of the batch.
+    fn sample(&self, points: &[Vec3], samples: &mut Samples);
+}
