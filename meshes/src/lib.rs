@@ -10,9 +10,12 @@
 
 pub mod shape;
 pub mod surface;
+pub mod surface_tree;
+pub mod triangle;
 
 pub use shape::{GridPattern, Hole, Outline, Placement, Shape, ShapeError, Weave};
 pub use surface::{ElectrodeSurface, SurfaceMesh};
+pub use surface_tree::{Hit, Nearest, SurfaceTree};
 
 /// A point or a vector in space, in metres unless said otherwise.
 pub type Vec3 = nalgebra::Vector3<f64>;
