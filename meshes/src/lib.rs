@@ -8,14 +8,19 @@
 //! * **sheet**: a surface of zero thickness, with free edges;
 //! * **closed**: without free edges, so that it has an inside.
 
+pub mod lattice;
+pub mod report;
 pub mod shape;
 pub mod surface;
 pub mod surface_tree;
 pub mod triangle;
+pub mod triangulate;
 
+pub use report::{ElectrodeReport, MeshReport};
 pub use shape::{GridPattern, Hole, Outline, Placement, Shape, ShapeError, Weave};
 pub use surface::{ElectrodeSurface, SurfaceMesh};
 pub use surface_tree::{Hit, Nearest, SurfaceTree};
+pub use triangulate::{Triangulation, triangulate, triangulate_to};
 
 /// A point or a vector in space, in metres unless said otherwise.
 pub type Vec3 = nalgebra::Vector3<f64>;

@@ -214,3 +214,176 @@ impl ShapeError {
         Self { key, problem: problem.into(), help: help.into() }
     }
 }
+
+impl Shape {
+    /// Whether the shape can be at all.
+    ///
+    /// # Errors
+    /// The first dimension that is not a positive number, or that contradicts another: which key, why, and what to change.
+    pub fn check(&self) -> Result<(), ShapeError> {
+        match self {
+            Self::Sphere { radius } => positive("radius", *radius),
+            Self::Ring { radius, wire_radius } => {
+                positive("radius", *radius)?;
+                positive("wire_radius", *wire_radius)?;
+                smaller("wire_radius", *wire_radius, "radius", *radius)
+            }
+            Self::Disc { radius, hole_radius, thickness } => {
+                positive("radius", *radius)?;
+                not_negative("hole_radius", *hole_radius)?;
+                not_negative("thickness", *thickness)?;
+                smaller("hole_radius", *hole_radius, "radius", *radius)
+            }
+            Self::Plate { size, thickness } => {
+                size.iter().try_for_each(|s| positive("size", *s))?;
+                not_negative("thickness", *thickness)
+            }
+            Self::EndCap { radius, opening, thickness } => {
+                positive("radius", *radius)?;
+                not_negative("thickness", *thickness)?;
+                positive("opening", *opening)?;
+                if *opening < 179.5_f64.to_radians() {
+                    return Ok(());
+                }
+                Err(ShapeError::new(
+                    "opening",
+                    format!("is {} deg, and a cap needs a half angle below 179.5 deg", opening.to_degrees()),
+                    "use shape = \"sphere\" for a whole sphere; a hemisphere is 90 deg",
+                ))
+            }
+            Self::GridPlate { outline, pitch, pattern } => check_grid(outline, *pitch, pattern),
+            Self::Cylinder { radius, length, .. } => {
+                positive("radius", *radius)?;
+                positive("length", *length)
+            }
+            Self::Rod { radius, length } => {
+                positive("radius", *radius)?;
+                positive("length", *length)?;
+                if *length >= 2.0 * radius {
+                    return Ok(());
+                }
+                Err(ShapeError::new(
+                    "length",
+                    format!("is {length} m, less than the two hemispherical ends of radius {radius} m need"),
+                    format!("make it {} m or more: it counts from tip to tip", 2.0 * radius),
+                ))
+            }
+            Self::Wire { points, wire_radius } => check_wire(points, *wire_radius),
+            Self::Box { size } => size.iter().try_for_each(|s| positive("size", *s)),
+            Self::HyperbolicRing { r0, z0, extent } | Self::HyperbolicCap { r0, z0, extent } => {
+                positive("r0", *r0)?;
+                positive("z0", *z0)?;
+                positive("extent", *extent)?;
+                let ring = matches!(self, Self::HyperbolicRing { .. });
+                if !ring || *extent > *r0 {
+                    return Ok(());
+                }
+                Err(ShapeError::new(
+                    "extent",
+                    format!("is {extent} m, but the ring begins at r0 = {r0} m from the axis"),
+                    "make it larger than r0; three times r0 is usual",
+                ))
+            }
+            Self::Mesh { vertices, triangles } => {
+                let finite = vertices.iter().flatten().all(|x| x.is_finite());
+                let known = triangles.iter().flatten().all(|v| (*v as usize) < vertices.len());
+                if finite && known && !triangles.is_empty() {
+                    return Ok(());
+                }
+                Err(ShapeError::new("file", "holds no usable triangles", "export the surface as triangles"))
+            }
+        }
+    }
+}
+
+fn positive(key: &'static str, value: f64) -> Result<(), ShapeError> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(ShapeError::new(key, format!("is {value}, and has to be greater than zero"), "give a positive number"))
+}
+
+fn not_negative(key: &'static str, value: f64) -> Result<(), ShapeError> {
+    if value >= 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(ShapeError::new(key, format!("is {value}, and cannot be negative"), "give zero or a positive number"))
+}
+
+fn smaller(key: &'static str, value: f64, than_key: &str, than: f64) -> Result<(), ShapeError> {
+    if value < than {
+        return Ok(());
+    }
+    let problem = format!("is {value} m, not less than {than_key} = {than} m");
+    Err(ShapeError::new(key, problem, format!("make {key} smaller or {than_key} larger")))
+}
+
+fn check_grid(outline: &Outline, pitch: f64, pattern: &GridPattern) -> Result<(), ShapeError> {
+    match outline {
+        Outline::Rectangle(size) => size.iter().try_for_each(|s| positive("size", *s))?,
+        Outline::Disc(radius) => positive("radius", *radius)?,
+    }
+    positive("pitch", pitch)?;
+    let none = |what: &str| {
+        let help = "make the pitch smaller or the plate larger";
+        ShapeError::new("pitch", format!("is {pitch} m: not one {what} fits on the plate"), help)
+    };
+    match pattern {
+        GridPattern::Perforated { hole, open, thickness } => {
+            positive("open", *open)?;
+            not_negative("thickness", *thickness)?;
+            smaller("open", *open, "pitch", pitch)?;
+            if crate::lattice::hole_lattice(*outline, pitch, *hole).is_empty() { Err(none("hole")) } else { Ok(()) }
+        }
+        GridPattern::Wires { weave, wire_radius } => {
+            positive("wire_radius", *wire_radius)?;
+            // Woven wires need room to pass between their neighbours.
+            let least = if *weave == Weave::Woven { 4.0 } else { 2.0 } * wire_radius;
+            if pitch <= least {
+                let problem = format!("is {pitch} m, too small for wires of radius {wire_radius} m");
+                return Err(ShapeError::new("pitch", problem, format!("make it larger than {least} m")));
+            }
+            let layers = if *weave == Weave::Parallel { &[true][..] } else { &[true, false][..] };
+            let missing =
+                |second: &bool| crate::lattice::wires_along(*outline, pitch, *wire_radius, *second).is_empty();
+            if layers.iter().any(missing) { Err(none("wire")) } else { Ok(()) }
+        }
+    }
+}
+
+fn check_wire(points: &[Vec3], wire_radius: f64) -> Result<(), ShapeError> {
+    positive("wire_radius", wire_radius)?;
+    let bad = |problem: String, help: &str| Err(ShapeError::new("points", problem, help));
+    if points.len() < 2 {
+        return bad(format!("has {} point(s)", points.len()), "a wire needs two points or more");
+    }
+    if !points.iter().flatten().all(|x| x.is_finite()) {
+        return bad("has a coordinate that is not a number".into(), "give finite coordinates");
+    }
+    let closed = points.len() > 2 && (points[0] - points[points.len() - 1]).norm() < 1e-9 * wire_radius;
+    let pieces = points.len() - 1;
+    let piece = |i: usize| points[(i % pieces) + 1] - points[i % pieces];
+    for i in 0..pieces {
+        if piece(i).norm() < 2.0 * wire_radius {
+            let (from, to) = (i + 1, i + 2);
+            let length = piece(i).norm();
+            return bad(
+                format!("{from} and {to} are {length} m apart, less than the wire is thick"),
+                "leave more room between points, or make the wire thinner",
+            );
+        }
+        if i + 1 < pieces || closed {
+            let turn = piece(i).angle(&piece(i + 1));
+            // A mitre of angle θ reaches r tan(θ/2) along each side.
+            let reach = wire_radius * (0.5 * turn).tan();
+            if turn > 2.4 || reach > 0.5 * piece(i).norm().min(piece(i + 1).norm()) {
+                let degrees = turn.to_degrees();
+                return bad(
+                    format!("turn by {degrees:.0} deg at point {}, too sharp for this wire", i + 2),
+                    "round the bend off with more points, or make the wire thinner",
+                );
+            }
+        }
+    }
+    Ok(())
+}

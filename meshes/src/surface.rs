@@ -1,6 +1,8 @@
 //! The triangulated surface of all electrodes.
 
-use crate::Vec3;
+use std::collections::HashMap;
+
+use crate::{Triangulation, Vec3};
 
 /// What one electrode is, apart from its panels.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +31,39 @@ pub struct SurfaceMesh {
 }
 
 impl SurfaceMesh {
+    /// Puts the triangulations of named electrodes, already in place, into one mesh. Whether each is closed is found from
+    /// its edges; none is hollow until said so.
+    pub fn assemble(parts: impl IntoIterator<Item = (String, Triangulation)>) -> Self {
+        let mut mesh = Self::default();
+        for (name, part) in parts {
+            let base = mesh.vertices.len() as u32;
+            let electrode = mesh.electrodes.len();
+            mesh.vertices.extend(part.vertices);
+            mesh.electrode.extend(std::iter::repeat_n(electrode as u32, part.triangles.len()));
+            mesh.triangles.extend(part.triangles.into_iter().map(|t| t.map(|v| v + base)));
+            mesh.electrodes.push(ElectrodeSurface { name, closed: false, hollow: false });
+            mesh.electrodes[electrode].closed = mesh.edge_defects(electrode) == (0, 0);
+        }
+        mesh
+    }
+
+    /// Edges of an electrode that belong to one panel only, and edges that more than two panels share or that two panels
+    /// run along in the same direction.
+    pub fn edge_defects(&self, electrode: usize) -> (usize, usize) {
+        // For each edge: how many panels run along it upwards and downwards in vertex number.
+        let mut uses: HashMap<[u32; 2], [u32; 2]> = HashMap::new();
+        for t in &self.triangles[self.panels_of(electrode)] {
+            for k in 0..3 {
+                let (a, b) = (t[k], t[(k + 1) % 3]);
+                let count = uses.entry([a.min(b), a.max(b)]).or_default();
+                count[usize::from(a > b)] += 1;
+            }
+        }
+        let open = uses.values().filter(|[up, down]| up + down == 1).count();
+        let bad = uses.values().filter(|count| !matches!(count, [1, 1] | [1, 0] | [0, 1])).count();
+        (open, bad)
+    }
+
     /// Number of panels.
     pub fn panels(&self) -> usize {
         self.triangles.len()
