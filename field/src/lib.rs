@@ -7,6 +7,8 @@
 pub mod basis_field;
 pub mod constants;
 pub mod driven;
+pub mod influence;
+pub mod panel;
 pub mod waveform;
 
 pub use basis_field::{BasisField, Samples};

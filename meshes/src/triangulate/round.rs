@@ -6,6 +6,7 @@ use super::Triangulation;
 use super::flat::thicken;
 use super::grading::{End, count_for, lines};
 use super::revolve::{Meridian, area_of_revolution, revolve, revolve_closed};
+use super::tube::capacitive_radius;
 use crate::Vec3;
 
 /// A count that scales with fineness, at least `least`.
@@ -32,23 +33,20 @@ pub(super) fn sphere(radius: f64, fineness: f64) -> Triangulation {
 pub(super) fn ring(radius: f64, wire_radius: f64, fineness: f64) -> Triangulation {
     // Round the wire the error is that of a polygon, (number of sides)^-2; along the ring the charge varies over the size of
     // the ring, so that panels there may be longer: up to sixteen times on a thin wire.
-    let sides = 2 * count(5.0, fineness, 4);
+    let sides = 2 * count(4.0, fineness, 3);
     let side = TAU * wire_radius / sides as f64;
     let round = TAU * (radius + wire_radius);
-    let longest = (round / count(24.0, fineness, 12) as f64).min(16.0 * side);
+    let longest = (round / count(36.0, fineness, 12) as f64).min(16.0 * side);
     let along = 8 * ((round / longest / 8.0).round() as usize).max(1);
+    let corner = capacitive_radius(wire_radius, sides);
     let meridian: Meridian = (0..sides)
         .map(|i| {
             // Half a step off the equator: panels, not points, face the axis and the outside.
             let (sin, cos) = (-TAU * (i as f64 + 0.5) / sides as f64).sin_cos();
-            [radius + wire_radius * cos, wire_radius * sin]
+            [radius + corner * cos, corner * sin]
         })
         .collect();
-    revolve_closed(&meridian, along).with_area(TAU * PI * 2.0 * radius * wire_radius, |v, k| {
-        let r = v.x.hypot(v.y);
-        let core = Vec3::new(v.x, v.y, 0.0) * (radius / r);
-        core + (v - core) * k
-    })
+    revolve_closed(&meridian, along)
 }
 
 pub(super) fn disc(radius: f64, hole_radius: f64, thickness: f64, fineness: f64) -> Triangulation {
