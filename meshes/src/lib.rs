@@ -10,6 +10,7 @@
 
 pub mod shape;
 pub mod surface;
+pub mod vtk;
 
 pub use shape::{GridPattern, Hole, Outline, Placement, Shape, ShapeError, Weave};
 pub use surface::{ElectrodeSurface, SurfaceMesh};
