@@ -15,6 +15,7 @@ pub mod surface;
 pub mod surface_tree;
 pub mod triangle;
 pub mod triangulate;
+pub mod vtk;
 
 pub use report::{ElectrodeReport, MeshReport};
 pub use shape::{GridPattern, Hole, Outline, Placement, Shape, ShapeError, Weave};
