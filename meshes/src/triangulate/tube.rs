@@ -14,7 +14,7 @@ const CLEARANCE: f64 = 0.1;
 
 /// Number of panels round a wire.
 fn sides(fineness: f64) -> usize {
-    2 * ((3.5 * fineness).round() as usize).max(3)
+    2 * ((4.0 * fineness).round() as usize).max(3)
 }
 
 /// Centre line with points as the mesh wants them, and whether it is closed.
