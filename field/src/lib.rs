@@ -9,6 +9,7 @@ pub mod constants;
 pub mod driven;
 pub mod influence;
 pub mod panel;
+pub mod source;
 pub mod waveform;
 
 pub use basis_field::{BasisField, Samples};
