@@ -1,4 +1,4 @@
-//! Surfaces from mesh files: Gmsh, STL and OBJ.
+//! Surfaces from mesh files: Gmsh, STL, OBJ and PLY.
 //!
 //! [`read`] turns the bytes of a file into an [`ImportedMesh`]: triangles, each with the name of the group that it
 //! belongs to in the file. [`ImportedMesh::select`] keeps one group; [`ImportedMesh::clean`] makes a surface of it that
@@ -10,6 +10,9 @@
 //! * STL: a solid, by its name in a text file, by the header of its section in a binary file (Gmsh writes one section
 //!   per solid). A solid without a name has no group, or is called `solid 2` where there are several.
 //! * OBJ: the last `o` or `g` statement before the face.
+//! * PLY: an integer property called `electrode`, `group`, `gmsh:physical`, `physical`,
+//!   `region`, `part` or `CellEntityIds` (in any case; the first of these that is there). The group is called by the
+//!   number: `3`.
 //!
 //! Elements of higher order are used as flat triangles and quadrilaterals between their corners. Quadrilaterals are cut
 //! along the shorter diagonal, polygons into triangles. Points, lines and volumes are passed over.
@@ -32,14 +35,17 @@
 //! `ply-rs-bw` 4 fills the memory when a header announces elements without properties, and takes 1.5 s for 500 000
 //! triangles of text. `mshio` 0.4 reads 4.1 only and no physical names.
 
-#[allow(dead_code)] // the PLY and VTK readers use the rest
+#[allow(dead_code)] // the VTK readers use the rest
 mod build;
+#[allow(dead_code)] // the VTK readers use the rest
+mod cells;
 mod clean;
 mod error;
 mod gmsh;
 mod obj;
+mod ply;
 mod polygon;
-#[allow(dead_code)] // the PLY and VTK readers use the rest
+#[allow(dead_code)] // the VTK readers use the rest
 mod scan;
 mod stl;
 
@@ -72,11 +78,13 @@ pub enum Format {
     Stl,
     /// Wavefront OBJ.
     Obj,
+    /// PLY (Stanford polygon file), ASCII or binary of either byte order.
+    Ply,
 }
 
 impl Format {
     /// All of them.
-    pub const ALL: [Format; 3] = [Format::Gmsh, Format::Stl, Format::Obj];
+    pub const ALL: [Format; 4] = [Format::Gmsh, Format::Stl, Format::Obj, Format::Ply];
 
     /// The format of files with this extension (without the dot, in any case), if it is one of ours.
     pub fn from_extension(extension: &str) -> Option<Self> {
@@ -84,6 +92,7 @@ impl Format {
             "msh" => Format::Gmsh,
             "stl" => Format::Stl,
             "obj" => Format::Obj,
+            "ply" => Format::Ply,
             _ => return None,
         })
     }
@@ -93,7 +102,7 @@ impl Format {
         let start = &bytes[..bytes.len().min(400)];
         let text = String::from_utf8_lossy(start);
         let text = text.trim_start_matches(|c: char| c == '\u{feff}' || c.is_whitespace());
-        [("$MeshFormat", Format::Gmsh), ("solid", Format::Stl)]
+        [("$MeshFormat", Format::Gmsh), ("ply", Format::Ply), ("solid", Format::Stl)]
             .into_iter()
             .find(|(mark, _)| text.starts_with(mark))
             .map(|(_, format)| format)
@@ -113,6 +122,7 @@ impl fmt::Display for Format {
             Format::Gmsh => "Gmsh",
             Format::Stl => "STL",
             Format::Obj => "OBJ",
+            Format::Ply => "PLY",
         })
     }
 }
@@ -129,6 +139,7 @@ pub fn read(format: Format, bytes: &[u8]) -> Result<ImportedMesh, ImportError> {
         Format::Gmsh => gmsh::read(bytes),
         Format::Stl => stl::read(bytes),
         Format::Obj => obj::read(bytes),
+        Format::Ply => ply::read(bytes),
     }
 }
 
