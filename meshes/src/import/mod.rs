@@ -1,4 +1,4 @@
-//! Surfaces from mesh files: Gmsh, STL, OBJ and PLY.
+//! Surfaces from mesh files: Gmsh, STL, OBJ, PLY, VTK and VTU.
 //!
 //! [`read`] turns the bytes of a file into an [`ImportedMesh`]: triangles, each with the name of the group that it
 //! belongs to in the file. [`ImportedMesh::select`] keeps one group; [`ImportedMesh::clean`] makes a surface of it that
@@ -10,7 +10,7 @@
 //! * STL: a solid, by its name in a text file, by the header of its section in a binary file (Gmsh writes one section
 //!   per solid). A solid without a name has no group, or is called `solid 2` where there are several.
 //! * OBJ: the last `o` or `g` statement before the face.
-//! * PLY: an integer property called `electrode`, `group`, `gmsh:physical`, `physical`,
+//! * PLY, VTK, VTU: an integer property or cell array called `electrode`, `group`, `gmsh:physical`, `physical`,
 //!   `region`, `part` or `CellEntityIds` (in any case; the first of these that is there). The group is called by the
 //!   number: `3`.
 //!
@@ -33,11 +33,9 @@
 //! only the first solid of a text file and of Gmsh's binary ones, takes any binary file that begins with "solid " for
 //! text, and refuses a text file whose solid has no name. `tobj` 4 names neither line nor number in its errors.
 //! `ply-rs-bw` 4 fills the memory when a header announces elements without properties, and takes 1.5 s for 500 000
-//! triangles of text. `mshio` 0.4 reads 4.1 only and no physical names.
+//! triangles of text. `mshio` 0.4 reads 4.1 only and no physical names. `vtkio` 0.7.0-rc2: see `vtk` and `vtu`.
 
-#[allow(dead_code)] // the VTK readers use the rest
 mod build;
-#[allow(dead_code)] // the VTK readers use the rest
 mod cells;
 mod clean;
 mod error;
@@ -45,9 +43,10 @@ mod gmsh;
 mod obj;
 mod ply;
 mod polygon;
-#[allow(dead_code)] // the VTK readers use the rest
 mod scan;
 mod stl;
+mod vtk;
+mod vtu;
 
 use std::fmt;
 
@@ -80,11 +79,15 @@ pub enum Format {
     Obj,
     /// PLY (Stanford polygon file), ASCII or binary of either byte order.
     Ply,
+    /// Legacy VTK: polygonal data or an unstructured grid, ASCII or (big-endian) binary.
+    Vtk,
+    /// VTK's XML files of unstructured grids, and of polygonal data (`.vtp`); all encodings, compressed by zlib or not.
+    Vtu,
 }
 
 impl Format {
     /// All of them.
-    pub const ALL: [Format; 4] = [Format::Gmsh, Format::Stl, Format::Obj, Format::Ply];
+    pub const ALL: [Format; 6] = [Format::Gmsh, Format::Stl, Format::Obj, Format::Ply, Format::Vtk, Format::Vtu];
 
     /// The format of files with this extension (without the dot, in any case), if it is one of ours.
     pub fn from_extension(extension: &str) -> Option<Self> {
@@ -93,6 +96,8 @@ impl Format {
             "stl" => Format::Stl,
             "obj" => Format::Obj,
             "ply" => Format::Ply,
+            "vtk" => Format::Vtk,
+            "vtu" | "vtp" => Format::Vtu,
             _ => return None,
         })
     }
@@ -102,10 +107,11 @@ impl Format {
         let start = &bytes[..bytes.len().min(400)];
         let text = String::from_utf8_lossy(start);
         let text = text.trim_start_matches(|c: char| c == '\u{feff}' || c.is_whitespace());
-        [("$MeshFormat", Format::Gmsh), ("ply", Format::Ply), ("solid", Format::Stl)]
+        [("$MeshFormat", Format::Gmsh), ("# vtk DataFile", Format::Vtk), ("ply", Format::Ply), ("solid", Format::Stl)]
             .into_iter()
             .find(|(mark, _)| text.starts_with(mark))
             .map(|(_, format)| format)
+            .or_else(|| text.contains("<VTKFile").then_some(Format::Vtu))
             .or_else(|| text.lines().any(|line| line.starts_with("v ")).then_some(Format::Obj))
     }
 
@@ -123,6 +129,8 @@ impl fmt::Display for Format {
             Format::Stl => "STL",
             Format::Obj => "OBJ",
             Format::Ply => "PLY",
+            Format::Vtk => "legacy VTK",
+            Format::Vtu => "VTK XML",
         })
     }
 }
@@ -140,6 +148,8 @@ pub fn read(format: Format, bytes: &[u8]) -> Result<ImportedMesh, ImportError> {
         Format::Stl => stl::read(bytes),
         Format::Obj => obj::read(bytes),
         Format::Ply => ply::read(bytes),
+        Format::Vtk => vtk::read(bytes),
+        Format::Vtu => vtu::read(bytes),
     }
 }
 
@@ -267,6 +277,7 @@ mod tests {
     #[test]
     fn extensions() {
         assert_eq!(Format::from_extension("STL"), Some(Format::Stl));
+        assert_eq!(Format::from_extension("vtp"), Some(Format::Vtu));
         assert_eq!(Format::from_extension("step"), None);
     }
 
