@@ -33,7 +33,8 @@
 //! only the first solid of a text file and of Gmsh's binary ones, takes any binary file that begins with "solid " for
 //! text, and refuses a text file whose solid has no name. `tobj` 4 names neither line nor number in its errors.
 //! `ply-rs-bw` 4 fills the memory when a header announces elements without properties, and takes 1.5 s for 500 000
-//! triangles of text. `mshio` 0.4 reads 4.1 only and no physical names. `vtkio` 0.7.0-rc2: see `vtk` and `vtu`.
+//! triangles of text. `vtkio` 0.7.0-rc2: see `vtk` and `vtu`. `mshio` 0.4 was left aside without a trial: by its
+//! description it reads 4.1 only, and no physical names.
 
 mod build;
 mod cells;
