@@ -1,13 +1,15 @@
 //! Electrode shapes as triangulated surfaces.
 //!
 //! A [`Shape`] with a [`Placement`] becomes triangles with outward normals, graded towards edges where charge crowds;
-//! several of them become one [`SurfaceMesh`], the only thing the field solver sees. This crate knows no volts.
+//! several of them become one [`SurfaceMesh`], the only thing the field solver sees. Surfaces drawn elsewhere come in
+//! through [`import`]. This crate knows no volts.
 //!
 //! * **panel**: one triangle, counter-clockwise seen from outside (from the side its normal points to);
 //! * **electrode**: a named set of panels at one potential;
 //! * **sheet**: a surface of zero thickness, with free edges;
 //! * **closed**: without free edges, so that it has an inside.
 
+pub mod import;
 pub mod lattice;
 pub mod report;
 pub mod shape;
