@@ -5,13 +5,25 @@
 //! * **driven field**: channels times their waveforms. Volts enter here and nowhere earlier.
 
 pub mod basis_field;
+pub mod boundary_problem;
+pub mod capacitance;
 pub mod constants;
 pub mod driven;
+pub mod electrode_basis;
 pub mod influence;
+pub mod linear_operator;
 pub mod panel;
+pub mod panel_sum;
 pub mod source;
 pub mod waveform;
 
 pub use basis_field::{BasisField, Samples};
+pub use boundary_problem::{BoundaryProblem, SolveError, SolveReport};
+pub use capacitance::{CapacitanceDefect, CapacitanceMatrix};
 pub use driven::DrivenField;
+pub use electrode_basis::ElectrodeBasis;
+pub use linear_operator::LinearOperator;
+pub use panel::Panel;
+pub use panel_sum::PanelSum;
+pub use source::{Source, SourceKind};
 pub use waveform::{Waveform, WaveformPart};

@@ -1,0 +1,258 @@
+//! From a surface to its charge: one factorisation, one solution for each electrode and source.
+
+use std::time::Instant;
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt;
+use faer::linalg::lu::partial_pivoting as lu;
+use faer::{Mat, Par};
+use meshes::SurfaceMesh;
+use rayon::prelude::*;
+
+use crate::capacitance::CapacitanceMatrix;
+use crate::constants::COULOMB;
+use crate::electrode_basis::ElectrodeBasis;
+use crate::influence::{Testing, potential_coefficients};
+use crate::linear_operator::GalerkinOperator;
+use crate::panel::{Panel, quadrature};
+use crate::source::Source;
+
+/// The electrostatic problem of conductors in given outside fields: on each electrode the potential is constant.
+#[derive(Clone, Copy, Debug)]
+pub struct BoundaryProblem<'a> {
+    /// The electrodes.
+    pub mesh: &'a SurfaceMesh,
+    /// Fields in closed form; each induces charges on the electrodes.
+    pub sources: &'a [Source],
+    /// How the condition is imposed.
+    pub testing: Testing,
+}
+
+/// Why there is no solution.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// A panel without area.
+    #[error("panel {panel} of electrode `{electrode}` has no area")]
+    Degenerate {
+        /// Which panel.
+        panel: usize,
+        /// Its electrode.
+        electrode: String,
+    },
+    /// A source's field is infinite on an electrode.
+    #[error("the field of source number {source_number} is infinite on electrode `{electrode}`: move one of them")]
+    SourceOnElectrode {
+        /// Which source, from 1.
+        source_number: usize,
+        /// The electrode.
+        electrode: String,
+    },
+    /// The matrix is not positive definite, as it must be for panels that do not lie on each other.
+    #[error(
+        "the matrix of potential coefficients is not positive definite at panel {panel} (electrode `{electrode}`): do panels there lie on each other?"
+    )]
+    NotPositiveDefinite {
+        /// Which panel.
+        panel: usize,
+        /// Its electrode.
+        electrode: String,
+    },
+    /// The charges do not reproduce the voltages they were asked for.
+    #[error(
+        "the solution misses its voltages by {residual:.1e} V per V (asked {asked:.0e}): panels of very different size or almost on each other?"
+    )]
+    Residual {
+        /// Largest error of the potential in the rows that were looked at, relative.
+        residual: f64,
+        /// What it had to be.
+        asked: f64,
+    },
+}
+
+/// Residual a direct solution must reach, V per V. The condition number of some 10⁴ panels stays below 10⁵, so that rounding
+/// leaves 1e-11; whatever misses this is broken.
+const RESIDUAL: f64 = 1e-7;
+
+/// Rows on which the residual is checked, spread over the panels; each costs as much as one row of the matrix.
+const CHECKED_ROWS: usize = 64;
+
+/// Seconds spent where, and how well the equations hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SolveReport {
+    /// Number of unknowns.
+    pub unknowns: usize,
+    /// Filling the matrix, s.
+    pub assembly_seconds: f64,
+    /// Factorising it and solving, s.
+    pub solve_seconds: f64,
+    /// Largest error of the potential on the rows that were looked at, V per V.
+    pub residual: f64,
+    /// Bytes of the matrix.
+    pub matrix_bytes: u64,
+}
+
+impl<'a> BoundaryProblem<'a> {
+    /// The problem of electrodes alone, with Galerkin testing.
+    pub fn new(mesh: &'a SurfaceMesh) -> Self {
+        Self { mesh, sources: &[], testing: Testing::Galerkin }
+    }
+
+    /// Bytes that [`BoundaryProblem::solve`] needs at its peak for that many panels and right-hand sides: the matrix, its
+    /// right-hand sides twice, and the panels.
+    pub fn memory_needed(panels: usize, right_hand_sides: usize) -> u64 {
+        let n = panels as u64;
+        8 * n * (n + 3 * right_hand_sides as u64 + 40)
+    }
+
+    /// Solves for every electrode at 1 V with the others at 0 V, and for every source of strength one with all electrodes
+    /// at 0 V.
+    ///
+    /// # Errors
+    /// See [`SolveError`].
+    pub fn solve(&self) -> Result<ElectrodeBasis, SolveError> {
+        let mesh = self.mesh;
+        let name = |panel: usize| mesh.electrodes[mesh.electrode[panel] as usize].name.clone();
+        let panels: Vec<Panel> = (0..mesh.panels()).map(|p| Panel::new(mesh.corners(p))).collect();
+        // `!(area > 0)` also catches an area that is not a number.
+        #[allow(clippy::neg_cmp_op_on_partial_ord)]
+        if let Some(panel) = panels.iter().position(|p| !(p.area > 0.0)) {
+            return Err(SolveError::Degenerate { panel, electrode: name(panel) });
+        }
+        let start = Instant::now();
+        let mut charge = self.right_hand_sides(&panels)?;
+        let wanted = charge.clone();
+        let mut matrix = potential_coefficients(&panels, self.testing);
+        let assembled = Instant::now();
+        if !panels.is_empty() {
+            self.factorise_and_solve(&mut matrix, &mut charge, name)?;
+        }
+        let matrix_bytes = 8 * (panels.len() * panels.len()) as u64;
+        drop(matrix);
+        let solved = Instant::now();
+        let residual = match self.testing {
+            Testing::Galerkin => residual(&panels, &charge, &wanted),
+            Testing::Collocation => 0.0,
+        };
+        if residual > RESIDUAL {
+            return Err(SolveError::Residual { residual, asked: RESIDUAL });
+        }
+        // So far potentials were charges over metres.
+        let charge = faer::Scale(1.0 / COULOMB) * &charge;
+        let on_electrode =
+            |electrode: usize, column: usize| -> f64 { mesh.panels_of(electrode).map(|p| charge[(p, column)]).sum() };
+        let electrodes = mesh.electrodes.len();
+        let charges: Vec<Vec<f64>> =
+            (0..electrodes).map(|i| (0..electrodes).map(|k| on_electrode(i, k)).collect()).collect();
+        let induced =
+            (0..electrodes).map(|i| (electrodes..charge.ncols()).map(|k| on_electrode(i, k)).collect()).collect();
+        Ok(ElectrodeBasis {
+            mesh: mesh.clone(),
+            panels,
+            sources: self.sources.to_vec(),
+            capacitance: CapacitanceMatrix::new(&charges),
+            induced,
+            charge,
+            report: SolveReport {
+                unknowns: mesh.panels(),
+                assembly_seconds: (assembled - start).as_secs_f64(),
+                solve_seconds: (solved - assembled).as_secs_f64(),
+                residual,
+                matrix_bytes,
+            },
+        })
+    }
+
+    /// Wanted potentials on the panels, V: one column for each electrode, then one for each source.
+    fn right_hand_sides(&self, panels: &[Panel]) -> Result<Mat<f64>, SolveError> {
+        let electrodes = self.mesh.electrodes.len();
+        let mut columns = Mat::<f64>::zeros(panels.len(), electrodes + self.sources.len());
+        for (p, &e) in self.mesh.electrode.iter().enumerate() {
+            columns[(p, e as usize)] = 1.0;
+        }
+        for (s, source) in self.sources.iter().enumerate() {
+            for (p, panel) in panels.iter().enumerate() {
+                // The electrode's potential is zero: its own charges cancel what the source brings.
+                let outside = match self.testing {
+                    Testing::Collocation => source.potential_and_gradient(&panel.centroid).0,
+                    Testing::Galerkin => quadrature::rule(5)
+                        .on(&panel.corners)
+                        .map(|(x, weight)| weight * source.potential_and_gradient(&x).0)
+                        .sum(),
+                };
+                if !outside.is_finite() {
+                    let electrode = self.mesh.electrodes[self.mesh.electrode[p] as usize].name.clone();
+                    return Err(SolveError::SourceOnElectrode { source_number: s + 1, electrode });
+                }
+                columns[(p, electrodes + s)] = -outside;
+            }
+        }
+        Ok(columns)
+    }
+
+    fn factorise_and_solve(
+        &self,
+        matrix: &mut Mat<f64>,
+        columns: &mut Mat<f64>,
+        name: impl Fn(usize) -> String,
+    ) -> Result<(), SolveError> {
+        let (n, par) = (matrix.nrows(), Par::rayon(0));
+        match self.testing {
+            Testing::Galerkin => {
+                let scratch = llt::factor::cholesky_in_place_scratch::<f64>(n, par, Default::default());
+                let mut memory = MemBuffer::new(scratch);
+                llt::factor::cholesky_in_place(
+                    matrix.as_mut(),
+                    Default::default(),
+                    par,
+                    MemStack::new(&mut memory),
+                    Default::default(),
+                )
+                .map_err(|llt::factor::LltError::NonPositivePivot { index }| {
+                    SolveError::NotPositiveDefinite { panel: index, electrode: name(index) }
+                })?;
+                let scratch = llt::solve::solve_in_place_scratch::<f64>(n, columns.ncols(), par);
+                let mut memory = MemBuffer::new(scratch);
+                llt::solve::solve_in_place(matrix.as_ref(), columns.as_mut(), par, MemStack::new(&mut memory));
+            }
+            Testing::Collocation => {
+                let (mut forward, mut backward) = (vec![0_usize; n], vec![0_usize; n]);
+                let scratch = lu::factor::lu_in_place_scratch::<usize, f64>(n, n, par, Default::default());
+                let mut memory = MemBuffer::new(scratch);
+                let (_, permutation) = lu::factor::lu_in_place(
+                    matrix.as_mut(),
+                    &mut forward,
+                    &mut backward,
+                    par,
+                    MemStack::new(&mut memory),
+                    Default::default(),
+                );
+                let scratch = lu::solve::solve_in_place_scratch::<usize, f64>(n, columns.ncols(), par);
+                let mut memory = MemBuffer::new(scratch);
+                lu::solve::solve_in_place(
+                    matrix.as_ref(),
+                    matrix.as_ref(),
+                    permutation,
+                    columns.as_mut(),
+                    par,
+                    MemStack::new(&mut memory),
+                );
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Largest relative error of the potentials on some rows, each computed anew without the matrix.
+fn residual(panels: &[Panel], charge: &Mat<f64>, wanted: &Mat<f64>) -> f64 {
+    let operator = GalerkinOperator { panels };
+    let stride = panels.len().div_ceil(CHECKED_ROWS).max(1);
+    let rows: Vec<usize> = (0..panels.len()).step_by(stride).collect();
+    (0..charge.ncols())
+        .map(|column| {
+            let x: Vec<f64> = charge.col(column).iter().copied().collect();
+            let largest = wanted.col(column).iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
+            let errors = rows.par_iter().map(|&i| (operator.row(i, &x) - wanted[(i, column)]).abs() / largest);
+            errors.reduce(|| 0.0, f64::max)
+        })
+        .fold(0.0, f64::max)
+}

@@ -1,0 +1,61 @@
+//! The solution of a boundary problem: charges on every panel for each unit excitation.
+
+use std::sync::Arc;
+
+use faer::Mat;
+use meshes::SurfaceMesh;
+
+use crate::boundary_problem::SolveReport;
+use crate::capacitance::CapacitanceMatrix;
+use crate::panel::Panel;
+use crate::panel_sum::PanelSum;
+use crate::source::Source;
+
+/// Unit solutions: basis function k is electrode k at 1 V with the others at 0 V; after the electrodes come the sources, each
+/// of strength one with all electrodes at 0 V.
+#[derive(Clone, Debug)]
+pub struct ElectrodeBasis {
+    /// The surface.
+    pub mesh: SurfaceMesh,
+    /// Its panels, in the same order.
+    pub panels: Vec<Panel>,
+    /// Outside fields in closed form.
+    pub sources: Vec<Source>,
+    /// Charge of each panel (row) in each basis function (column), C per volt or per unit of source strength.
+    pub charge: Mat<f64>,
+    /// Charges on electrodes for unit voltages.
+    pub capacitance: CapacitanceMatrix,
+    /// Charge on each electrode (row) that each source (column) of strength one induces, C.
+    pub induced: Vec<Vec<f64>>,
+    /// How the solution went.
+    pub report: SolveReport,
+}
+
+impl ElectrodeBasis {
+    /// Number of basis functions: electrodes and sources.
+    pub fn functions(&self) -> usize {
+        self.mesh.electrodes.len() + self.sources.len()
+    }
+
+    /// Surface charge density of each panel in one basis function, C/m² per volt (or per unit of strength).
+    pub fn charge_density(&self, function: usize) -> Vec<f64> {
+        self.panels.iter().enumerate().map(|(p, panel)| self.charge[(p, function)] / panel.area).collect()
+    }
+
+    /// The exact field of every basis function.
+    pub fn panel_sum(&self) -> PanelSum {
+        let identity: Vec<Vec<f64>> = (0..self.functions())
+            .map(|k| (0..self.functions()).map(|l| f64::from(u8::from(k == l))).collect())
+            .collect();
+        self.combined(&identity)
+    }
+
+    /// The exact field of combinations of basis functions: channel c is Σ_k `weights[c][k]` times basis function k.
+    ///
+    /// # Panics
+    /// A row of weights has another length than there are basis functions.
+    pub fn combined(&self, weights: &[Vec<f64>]) -> PanelSum {
+        assert!(weights.iter().all(|row| row.len() == self.functions()), "a weight for each basis function");
+        PanelSum::new(self, weights.iter().map(|row| Arc::from(row.as_slice())).collect())
+    }
+}

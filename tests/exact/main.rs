@@ -1,0 +1,6 @@
+//! Against closed forms and reference values of twelve digits and more.
+
+mod capacitance;
+mod composite;
+mod panel_integrals;
+mod sphere_in_field;

@@ -1,0 +1,3 @@
+//! Laws: reciprocity, superposition, rotation, thread count.
+
+mod threads;

@@ -1,0 +1,1 @@
+//! Slopes of log error over log h or log dt.
