@@ -1,1 +1,4 @@
 //! The case file, the pipeline that turns it into files, and the command line.
+
+pub mod quantity;
+mod suggestion;
