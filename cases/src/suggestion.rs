@@ -23,6 +23,18 @@ pub(crate) fn nearest<S: AsRef<str>>(typed: &str, known: impl IntoIterator<Item 
         .map(|(_, _, name)| name)
 }
 
+/// "a", "a and b", "a, b and c".
+pub(crate) fn list<S: AsRef<str>>(items: &[S], last: &str) -> String {
+    match items {
+        [] => String::new(),
+        [only] => only.as_ref().to_owned(),
+        [first @ .., end] => {
+            let first: Vec<&str> = first.iter().map(AsRef::as_ref).collect();
+            format!("{} {last} {}", first.join(", "), end.as_ref())
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -35,5 +47,11 @@ mod tests {
         assert_eq!(nearest("centre", keys).as_deref(), Some("center"));
         assert_eq!(nearest("voltage", keys), None);
         assert_eq!(nearest("KV", ["kV", "MV", "V"]).as_deref(), Some("kV"));
+    }
+
+    #[test]
+    fn lists_read_as_sentences() {
+        assert_eq!(list(&["a"], "or"), "a");
+        assert_eq!(list(&["a", "b", "c"], "or"), "a, b or c");
     }
 }

@@ -8,11 +8,13 @@
 //! ```
 
 mod kind;
+mod si;
 mod units;
 
 use std::f64::consts::TAU;
 
 pub use kind::Kind;
+pub(crate) use si::{Amplitude, Any, Drag, NonNegative, Positive, Range, Si, kinds};
 use units::Exponents;
 
 /// Why a string is not the quantity that was wanted. [`QuantityError::help`] says what to change.
@@ -33,6 +35,12 @@ pub enum QuantityError {
         text: String,
         /// What was wanted.
         expected: String,
+    },
+    /// A decimal comma.
+    #[error("\"{text}\" has a decimal comma")]
+    DecimalComma {
+        /// What was written.
+        text: String,
         /// What to change.
         help: String,
     },
@@ -90,7 +98,7 @@ impl QuantityError {
     /// What to change, where more than the message itself can be said.
     pub fn help(&self) -> Option<&str> {
         match self {
-            Self::NotANumber { help, .. }
+            Self::DecimalComma { help, .. }
             | Self::NoUnit { help, .. }
             | Self::UnknownUnit { help, .. }
             | Self::WrongDimension { help, .. } => Some(help).filter(|help| !help.is_empty()).map(String::as_str),
@@ -120,11 +128,11 @@ pub fn parse(text: &str, kinds: &[Kind]) -> Result<(f64, Kind), QuantityError> {
         if ["nan", "inf"].iter().any(|name| word.starts_with(name)) {
             return Err(QuantityError::NotFinite { text: owned(), expected: expected() });
         }
-        return Err(QuantityError::NotANumber { text: owned(), expected: expected(), help: String::new() });
+        return Err(QuantityError::NotANumber { text: owned(), expected: expected() });
     }
     if let Some(decimals) = unit.strip_prefix(',').filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit())) {
         let help = format!("write the decimal point as a point: \"{number}.{decimals}\"");
-        return Err(QuantityError::NotANumber { text: owned(), expected: expected(), help });
+        return Err(QuantityError::DecimalComma { text: owned(), help });
     }
     if unit.is_empty() {
         let help =
@@ -168,7 +176,7 @@ pub fn parse(text: &str, kinds: &[Kind]) -> Result<(f64, Kind), QuantityError> {
 }
 
 /// "metres or a string such as "2 mm"".
-fn expected(kinds: &[Kind]) -> String {
+pub(crate) fn expected(kinds: &[Kind]) -> String {
     match kinds {
         // A bare number could be either, so it is not offered.
         [Kind::DragRate, _] => "a string such as \"0.1 /s\" or \"1e-14 kg/s\"".to_owned(),
@@ -178,7 +186,7 @@ fn expected(kinds: &[Kind]) -> String {
 }
 
 /// "a length"; "a drag rate or a drag coefficient".
-fn nouns(kinds: &[Kind]) -> String {
+pub(crate) fn nouns(kinds: &[Kind]) -> String {
     kinds.iter().map(|kind| kind.noun()).collect::<Vec<_>>().join(" or ")
 }
 
@@ -201,7 +209,7 @@ fn sample_unit(kind: Kind) -> &'static str {
 }
 
 /// Splits "1.5e3 V" into number and unit: the longest beginning that is a number.
-fn split(text: &str) -> (&str, &str) {
+pub(crate) fn split(text: &str) -> (&str, &str) {
     let bytes = text.as_bytes();
     let digits = |mut at: usize| {
         let start = at;

@@ -101,7 +101,10 @@ pub(super) fn unit(text: &str, wanted: Kind) -> Option<Unit> {
 
 /// The unit most like one that does not exist, among those in use for the wanted kind.
 pub(super) fn nearest(text: &str, wanted: Kind) -> Option<String> {
+    let lower = text.to_lowercase();
     crate::suggestion::nearest(text, wanted.usual_units())
+        // "Volt" and "Millimeters": unit names are written small.
+        .or_else(|| single(&lower, Some(wanted)).filter(|unit| unit.exponents == wanted.exponents()).map(|_| lower))
 }
 
 /// A single unit, in any of the notations people use.
