@@ -6,7 +6,7 @@ use crate::key_path::Segment;
 use crate::reader::{Fault, Variant, What};
 use crate::schema::keys_of;
 use crate::suggestion::{list, nearest};
-use crate::tree::{Node, Value};
+use crate::tree::{Node, Origin, Value};
 
 /// Longer values are cut in sentences; the lines of the file show them whole.
 const LONGEST_VALUE: usize = 48;
@@ -31,9 +31,10 @@ pub(crate) fn explain(source: &CaseSource, fault: Fault) -> CaseError {
         }
         What::WrongType { expected } => {
             let last = last_key(&path);
-            let help =
-                wrong_brackets(node, last, path.len()).or_else(|| unquoted_string(node, &expected, source, &path));
             let value = shown(source, &path);
+            let help = wrong_brackets(node, last, path.len())
+                .or_else(|| unquoted_string(node, &expected, &value))
+                .or_else(|| lonely_component(node, &expected, &value));
             let is = format!("{value} is {}", node.type_name());
             source.error(&path, Mark::Value, format!("{is}: expected {expected}"), help, None)
         }
@@ -59,7 +60,14 @@ fn unknown_key(source: &CaseSource, path: &[Segment], known: &[&'static str], va
         None if table.is_empty() => format!("a case takes {}", list(known, "and")),
         None => format!("{} takes {}", source.tree.display(table), list(known, "and")),
     };
-    let siblings = variant.map(|variant| owners(variant, key)).unwrap_or_default();
+    let siblings = match variant {
+        Some(variant) => owners(variant, key),
+        None => tables_with(key, table),
+    };
+    if let Some(path_in_quotes) = bare_sweep(source, path) {
+        let problem = "key paths stand in quotes in a sweep".to_owned();
+        return source.error(&path[..2], Mark::Key, problem, Some(format!("write {path_in_quotes} = ...")), None);
+    }
     let (problem, help) = if !siblings.is_empty() {
         (format!("`{key}` belongs to {}; {takes}", list(&siblings, "and")), None)
     } else {
@@ -67,9 +75,15 @@ fn unknown_key(source: &CaseSource, path: &[Segment], known: &[&'static str], va
         // A key that stands there already is less likely meant; but on the command line it is.
         let free = known.iter().copied().filter(|name| !written.contains(name));
         let meant = nearest(key, free).or_else(|| nearest(key, known)).or_else(|| synonym(key, known));
+        let meant = if table.is_empty() { thing_called(source, key).or(meant) } else { meant };
         let problem = format!("unknown key `{key}`{place}");
         let takes = capital(&takes);
-        (problem, Some(meant.map_or(takes.clone(), |name| format!("did you mean `{name}`? {takes}"))))
+        let help = match meant {
+            Some(radius) if key == "diameter" => format!("give the `{radius}`, which is half of it. {takes}"),
+            Some(name) => format!("did you mean `{name}`? {takes}"),
+            None => takes,
+        };
+        (problem, Some(help))
     };
     let mark = if siblings.is_empty() { Mark::UnknownKey } else { Mark::Key };
     source.error(path, mark, problem, help, None)
@@ -99,6 +113,12 @@ fn missing_key(
         Some(help) if inline => Some(help.replacen("add a line such as ", "write ", 1).replacen("add ", "write ", 1)),
         other => other,
     };
+    let help = match (source.tree.find(path).node.span.origin, example(key)) {
+        (Origin::Set(_), Some(value)) => {
+            Some(format!("set it as well: --set '{}.{key}={}'", source.tree.display(path), value.trim_matches('"')))
+        }
+        _ => help,
+    };
     let problem = format!("`{key}` is missing{what}");
     source.error(path, Mark::Value, problem, help, Some(format!("no `{key}` here")))
 }
@@ -108,6 +128,43 @@ fn owners(variant: &Variant, key: &str) -> Vec<String> {
     let mut owners = keys_of(variant.family);
     owners.retain(|(_, keys)| keys.iter().any(|known| known == key));
     owners.into_iter().map(|(name, _)| name).collect()
+}
+
+/// The other settings tables that take `key`, where `table` is one of those.
+fn tables_with(key: &str, table: &[Segment]) -> Vec<String> {
+    let settings = keys_of("settings");
+    let [Segment::Key(table)] = table else { return Vec::new() };
+    if !settings.iter().any(|(name, _)| name == table) {
+        return Vec::new();
+    }
+    let others = settings.iter().filter(|(name, keys)| name != table && keys.iter().any(|known| known == key));
+    others.map(|(name, _)| format!("[{name}]")).collect()
+}
+
+/// The path of an electrode, source or group of grains of this name, for `--set left.dc=5`.
+fn thing_called(source: &CaseSource, name: &str) -> Option<String> {
+    let has =
+        |list: &&str| source.tree.get(list).is_some_and(|list| list.entries().iter().any(|e| e.name() == Some(name)));
+    let list = crate::set::LISTS.into_iter().find(|list| has(list))?;
+    Some(format!("{list}.{name}"))
+}
+
+/// `electrode.left.dc = ...` in a sweep without quotes is a table in a table: the path that was meant.
+fn bare_sweep(source: &CaseSource, path: &[Segment]) -> Option<String> {
+    let [Segment::Key(sweep), Segment::Key(first), ..] = path else { return None };
+    if sweep != "sweep" || first.contains('.') || path.len() < 3 {
+        return None;
+    }
+    let mut parts = vec![first.clone()];
+    let mut at = source.tree.get(sweep)?.get(first)?;
+    while let Value::Table(entries) = &at.value
+        && let [entry, ..] = &entries[..]
+        && entry.key != "from"
+    {
+        parts.push(entry.key.clone());
+        at = &entry.node;
+    }
+    Some(format!("\"{}\"", parts.join(".")))
 }
 
 /// Words that people try for a key.
@@ -183,10 +240,20 @@ fn wrong_brackets(node: &Node, key: &str, depth: usize) -> Option<String> {
 }
 
 /// A number where a string should stand, as happens to `--set title=1`.
-fn unquoted_string(node: &Node, expected: &str, source: &CaseSource, path: &[Segment]) -> Option<String> {
+fn unquoted_string(node: &Node, expected: &str, value: &str) -> Option<String> {
     let scalar = matches!(node.value, Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Date);
-    let literal = source.literal(path)?;
-    (scalar && expected == "a string").then(|| format!("put it in quotes: \"{literal}\""))
+    (scalar && expected == "a string").then(|| format!("put it in quotes: \"{value}\""))
+}
+
+/// One number where two or three should stand.
+fn lonely_component(node: &Node, expected: &str, value: &str) -> Option<String> {
+    let scalar = matches!(node.value, Value::Integer(_) | Value::Float(_) | Value::String(_));
+    match expected {
+        _ if !scalar => None,
+        "a list of two, [a, b]" => Some(format!("for a square, write [{value}, {value}]")),
+        "a list of three, [x, y, z]" => Some(format!("along z, for instance, it is [0, 0, {value}]")),
+        _ => None,
+    }
 }
 
 /// The value as written, cut where it is long.

@@ -139,7 +139,7 @@ fn implied(family: &str, table: &Node) -> Option<&'static str> {
     }
 }
 
-/// What is expected of a value that may have several forms.
+/// What is expected of a value that may have several forms, or is a table of several kinds.
 fn forms(family: &str) -> &'static str {
     match family {
         "RfKeys" => {
@@ -152,7 +152,11 @@ fn forms(family: &str) -> &'static str {
         "DirectionKeys" => "an axis as \"x\" or \"-z\", or three numbers [a, b, c]",
         "End" => "a number or a string with a unit",
         "SweepKeys" => "a list of values or a table as { from = \"1 V\", to = \"9 V\", steps = 5 }",
-        _ => "something else",
+        "WaveformKeys" => "a table as { amplitude = \"300 V\", frequency = \"60 Hz\" }",
+        "PlaceKeys" => "a table as { kind = \"ball\", radius = \"1 mm\" }",
+        "SpeedKeys" => "a table as { kind = \"thermal\", temperature = \"300 K\" }",
+        "GasDragKeys" => "a table as { model = \"stokes\", gas = \"air\", pressure = \"1 bar\" }",
+        _ => "a table",
     }
 }
 
@@ -280,7 +284,7 @@ impl<'de> Deserializer<'de> for Reader<'de, '_> {
         let choice = |name: &'de str, tag| Choice { reader: self, family, name, tag };
         if let Some(tag) = tag(family) {
             if !matches!(self.node.value, Value::Table(_)) {
-                return Err(Fault::invalid_type(Unexpected::Map, &"a table"));
+                return Err(Fault::new(What::WrongType { expected: forms(family).to_owned() }));
             }
             let name = match self.node.get(tag).map(|node| &node.value) {
                 Some(Value::String(name)) => name.as_str(),

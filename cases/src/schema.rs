@@ -42,6 +42,9 @@ fn without_null(schema: &mut Value) {
         Value::Object(table) => {
             if let Some(types) = table.get_mut("type").and_then(Value::as_array_mut) {
                 types.retain(|name| name != "null");
+                if let [only] = &types[..] {
+                    table["type"] = only.clone();
+                }
             }
             if let Some(forms) = table.get_mut("anyOf").and_then(Value::as_array_mut) {
                 forms.retain(|form| form != &json!({ "type": "null" }));
@@ -70,6 +73,7 @@ pub(crate) fn keys_of(family: &str) -> Vec<(String, Vec<String>)> {
         "SpeedKeys" => ("kind", generator.into_root_schema_for::<grains::SpeedKeys>()),
         "WaveformKeys" => ("kind", generator.into_root_schema_for::<waveform::WaveformKeys>()),
         "GasDragKeys" => ("model", generator.into_root_schema_for::<settings::GasDragKeys>()),
+        "settings" => return settings_keys(),
         _ => return Vec::new(),
     };
     let variants = schema.as_value()["oneOf"].as_array().cloned().unwrap_or_default();
@@ -79,6 +83,18 @@ pub(crate) fn keys_of(family: &str) -> Vec<(String, Vec<String>)> {
         Some((name, properties.keys().filter(|key| *key != tag).cloned().collect()))
     };
     variants.iter().filter_map(keys).collect()
+}
+
+/// The same for the tables of settings.
+fn settings_keys() -> Vec<(String, Vec<String>)> {
+    let schema = schema();
+    let table = |name: &str, pointer: &str| {
+        let properties = schema.pointer(pointer).and_then(Value::as_object);
+        (name.to_owned(), properties.map(|keys| keys.keys().cloned().collect()).unwrap_or_default())
+    };
+    [("field", "Field"), ("table", "Table"), ("forces", "Force"), ("trace", "Trace"), ("output", "Output")]
+        .map(|(name, keys)| table(name, &format!("/$defs/{keys}Keys/properties")))
+        .into()
 }
 
 /// The schema of a table that is read as two structs: each variant of the second with the keys of the first.

@@ -95,6 +95,12 @@ pub(crate) fn set(tree: &mut Node, argument: &str, number: usize) -> Result<(), 
 /// The keys of a case that are lists of tables.
 pub(crate) const LISTS: [&str; 3] = ["electrode", "source", "grains"];
 
+/// Keys that one may try to set without saying of which entry.
+const KEYS_OF_ENTRIES: [&str; 15] = [
+    "shape", "center", "axis", "up", "dc", "rf", "charge", "panels", "kind", "count", "mass", "density", "radius",
+    "place", "speed",
+];
+
 /// The `=` between key and value: the first outside quotes.
 fn equals_sign(argument: &str) -> Option<usize> {
     let mut quote = None;
@@ -121,9 +127,10 @@ fn no_entry(
         let help = if count == 0 { "the list is empty".to_owned() } else { format!("its entries are 1 to {count}") };
         return fault(format!("`{list_path}` is a list: it has no entry `{part}`"), Some(help));
     }
-    if rest.len() == 1 && part.parse::<usize>().is_err() && names.is_empty() {
-        // grains.mass: the number is left out
-        let help = format!("say which entry: `{list_path}.1.{part}`");
+    if rest.len() == 1 && KEYS_OF_ENTRIES.contains(&part) {
+        // grains.mass: which group is left out
+        let which = names.first().map_or("1", String::as_str);
+        let help = format!("say which one: `{list_path}.{which}.{part}`");
         return fault(format!("`{list_path}` is a list: it has no entry `{part}`"), Some(help));
     }
     let known = if names.is_empty() {

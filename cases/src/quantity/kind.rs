@@ -46,7 +46,7 @@ pub enum Kind {
 }
 
 /// Every kind, in the order in which a unit's meaning is looked for.
-const KINDS: [Kind; 19] = [
+pub(super) const KINDS: [Kind; 19] = [
     Kind::Length,
     Kind::Time,
     Kind::Frequency,

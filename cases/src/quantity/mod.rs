@@ -187,7 +187,7 @@ pub(crate) fn expected(kinds: &[Kind]) -> String {
 
 /// "a length"; "a drag rate or a drag coefficient".
 pub(crate) fn nouns(kinds: &[Kind]) -> String {
-    kinds.iter().map(|kind| kind.noun()).collect::<Vec<_>>().join(" or ")
+    crate::suggestion::list(&kinds.iter().map(|kind| kind.noun()).collect::<Vec<_>>(), "or")
 }
 
 fn unknown_unit(text: &str, number: &str, unit: &str, kinds: &[Kind]) -> QuantityError {
@@ -316,6 +316,8 @@ mod tests {
         close("2 min", Kind::Time, 120.0);
         close("1 in", Kind::Length, 0.0254);
         close("1 N/C", Kind::ElectricField, 1.0);
+        close("1 mrad", Kind::Angle, 1e-3);
+        close("1 keV", Kind::Energy, 1.602_176_634e-16);
         close("1 kg/(A s^2)", Kind::MagneticField, 1.0);
     }
 
@@ -325,6 +327,17 @@ mod tests {
         assert_eq!(parse("0.1 /s", &drag).unwrap(), (0.1, Kind::DragRate));
         assert_eq!(parse("1/s", &drag).unwrap(), (1.0, Kind::DragRate));
         assert_eq!(parse("1e-14 kg/s", &drag).unwrap(), (1e-14, Kind::DragCoefficient));
+    }
+
+    #[test]
+    fn every_suggestion_and_every_example_can_be_read() {
+        for kind in kind::KINDS {
+            for unit in kind.usual_units() {
+                let (_, found) = parse(&format!("1 {unit}"), &[kind]).unwrap_or_else(|error| panic!("{error}"));
+                assert_eq!(found, kind);
+            }
+            assert_eq!(parse(kind.example(), &[kind]).map(|(_, kind)| kind), Ok(kind));
+        }
     }
 
     #[test]

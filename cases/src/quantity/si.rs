@@ -180,12 +180,18 @@ impl<'de, K: Measure, R: Range> Deserialize<'de> for Si<K, R> {
 ///
 /// The pattern demands a number and something after it. It leaves out which units exist: compounds are endless.
 fn schema<R: Range>(kinds: &[Kind]) -> Schema {
-    let sign = if R::SIGNED { "[-+\u{2212}]?" } else { "[+]?" };
+    // A temperature above zero may be written below zero: "-20 degC".
+    let signed = R::SIGNED || kinds.contains(&Kind::Temperature);
+    let sign = if signed { "[-+\u{2212}]?" } else { "[+]?" };
     let number = r"([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?";
+    let unit = r"(\s*[^\s0-9,.+-]|\s+1\s*/).*";
+    let names: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
+    let examples: Vec<&str> = kinds.iter().map(|kind| kind.example()).collect();
     let mut schema = json_schema!({
         "type": ["number", "string"],
-        "description": format!("{}: {}", kinds.iter().map(|k| k.name()).collect::<Vec<_>>().join(" or "), expected(kinds)),
-        "pattern": format!(r"^\s*{sign}{number}\s*[^\s0-9,.+-].*$"),
+        "title": format!("{}: {}", crate::suggestion::list(&names, "or"), expected(kinds)),
+        "pattern": format!(r"^\s*{sign}{number}{unit}$"),
+        "examples": examples,
     });
     for (bound, value) in R::BOUNDS {
         schema.insert((*bound).to_owned(), (*value).into());

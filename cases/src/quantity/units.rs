@@ -121,7 +121,23 @@ fn single(text: &str, wanted: Option<Kind>) -> Option<Unit> {
             }
         }
     }
-    None
+    prefixed(text)
+}
+
+/// Parts and multiples that `uom` leaves out.
+fn prefixed(text: &str) -> Option<Unit> {
+    let base = ["rad", "eV", "Da", "u"].into_iter().find(|base| text.len() > base.len() && text.ends_with(base))?;
+    let factor = match text.strip_suffix(base)? {
+        "n" => 1e-9,
+        "u" | "µ" | "\u{3bc}" => 1e-6,
+        "m" => 1e-3,
+        "k" => 1e3,
+        "M" => 1e6,
+        "G" => 1e9,
+        _ => return None,
+    };
+    let base = single(base, None)?;
+    Some(Unit { factor: factor * base.factor, ..base })
 }
 
 /// The ways `uom` may spell what was typed.
