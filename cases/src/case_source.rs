@@ -61,6 +61,11 @@ impl CaseSource {
         let file = path.display().to_string();
         // A byte order mark is no part of the first key; editors on Windows write one.
         let text = text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text);
+        if let Some(at) = syntax::too_deep(&text) {
+            let problem = format!("a key has more than {} parts", syntax::DEEPEST_KEY);
+            let what = Complaint { problem, help: Some("no key of a case has".to_owned()), ..Complaint::default() };
+            return Err(CaseError::at(&file, None, &text, Some(at..at + 1), what));
+        }
         let (table, errors) = DeTable::parse_recoverable(&text);
         if let Some(error) = errors.first() {
             let fault = syntax::fault(&text, error, table.get_ref());

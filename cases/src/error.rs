@@ -66,7 +66,7 @@ impl Look {
     /// For files, pipes and logs: ASCII, no colours, long lines.
     pub const PLAIN: Self = Self { unicode: false, color: false, width: 120 };
     /// For a terminal.
-    pub const TERMINAL: Self = Self { unicode: true, color: true, width: 100 };
+    pub const TERMINAL: Self = Self { unicode: true, color: true, width: 80 };
 
     /// What suits standard error: [`Look::TERMINAL`] on a terminal (without colours where `NO_COLOR` is set), else plain.
     pub fn of_stderr() -> Self {
@@ -181,7 +181,18 @@ impl CaseError {
     }
 }
 
-/// The range made drawable: within the text, at least one character, at character boundaries, without the line's end.
+/// Lines longer than this are not drawn: whoever reads the message finds the place faster by line and column.
+const LONGEST_LINE: usize = 200;
+
+/// Whether the line at `position` is short enough to be drawn.
+fn drawable(text: &str, position: usize) -> bool {
+    let start = text[..position].rfind('\n').map_or(0, |at| at + 1);
+    let end = text[position..].find('\n').map_or(text.len(), |at| position + at);
+    end - start <= LONGEST_LINE
+}
+
+/// The range made drawable: within the text, at least one character, at character boundaries, and of a value of several
+/// lines the first.
 fn underlined(text: &str, range: Range<usize>) -> Range<usize> {
     let mut start = range.start.min(text.len());
     while !text.is_char_boundary(start) {
@@ -191,7 +202,8 @@ fn underlined(text: &str, range: Range<usize>) -> Range<usize> {
     while !text.is_char_boundary(end) {
         end += 1;
     }
-    end = start + text[start..end].trim_end().len();
+    let first_line = text[start..end].lines().next().unwrap_or("");
+    end = start + first_line.trim_end().len();
     if end == start
         && let Some(c) = text[start..].chars().next().filter(|c| !c.is_whitespace())
     {
@@ -238,7 +250,8 @@ impl<'e> Snippet<'e> {
             Some(_) => format!("--set (for {})", error.file),
             None => error.file.clone(),
         };
-        let lines = error.range.is_some().then(|| NamedSource::new(name, error.0.text.replace('\r', " ")));
+        let drawn = error.range.as_ref().is_some_and(|range| drawable(&error.0.text, range.start));
+        let lines = drawn.then(|| NamedSource::new(name, error.0.text.replace('\r', " ")));
         let sentence = if lines.is_some() { error.sentence() } else { error.headline() };
         Self { sentence, error, lines }
     }
@@ -254,6 +267,6 @@ impl Diagnostic for Snippet<'_> {
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        self.error.labels()
+        self.lines.as_ref().and_then(|_| self.error.labels())
     }
 }

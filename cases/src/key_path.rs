@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::syntax::DEEPEST_KEY;
+
 /// One step down: a key of a table, or an entry of a list (counted from zero inside, shown from one).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Segment {
@@ -64,6 +66,9 @@ pub(crate) fn split(path: &str) -> Result<Vec<String>, String> {
         rest = rest[end..].trim_start();
         if rest.is_empty() {
             return Ok(parts);
+        }
+        if parts.len() > DEEPEST_KEY {
+            return Err(format!("the key path has more than {DEEPEST_KEY} parts"));
         }
         rest = match rest.strip_prefix('.') {
             Some(rest) => rest.trim_start(),

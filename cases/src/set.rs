@@ -166,6 +166,9 @@ fn value(argument: &str, start: usize, origin: Origin, key: &str) -> Result<Node
             "write key=value; an empty string is '\"\"'",
         ));
     }
+    if crate::syntax::too_deep(text).is_some() {
+        return Err(fault(span, "the value holds a key of too many parts".to_owned(), "no key of a case has"));
+    }
     const HEAD: &str = "x = ";
     let document = format!("{HEAD}{text}");
     let shift = Shift { origin, by: start as isize - HEAD.len() as isize };
@@ -176,7 +179,7 @@ fn value(argument: &str, start: usize, origin: Origin, key: &str) -> Result<Node
                 return Ok(Node { span, value: Value::String(text.to_owned()) });
             };
             match (entries.pop(), entries.is_empty()) {
-                (Some(entry), true) => Ok(Node { span, value: entry.node.value }),
+                (Some(entry), true) => Ok(entry.node),
                 _ => Err(fault(span, "the value spans several lines".to_owned(), "set one key at a time")),
             }
         }

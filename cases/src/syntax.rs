@@ -13,6 +13,33 @@ pub(crate) struct SyntaxFault {
     pub help: Option<String>,
 }
 
+/// Keys of more parts than this are refused before the parser sees them: it limits the depth of lists and tables, but not
+/// of dotted keys, and tables within tables by the ten thousand exhaust the stack. Real cases need six.
+pub(crate) const DEEPEST_KEY: usize = 50;
+
+/// Where a key has too many parts, if one has.
+pub(crate) fn too_deep(text: &str) -> Option<usize> {
+    let (mut dots, mut quote) = (0, None);
+    let mut letters = text.char_indices();
+    while let Some((at, letter)) = letters.next() {
+        match letter {
+            '\n' => (dots, quote) = (0, None),
+            '\\' if quote == Some('"') => drop(letters.next()),
+            '"' | '\'' if quote.is_none() => quote = Some(letter),
+            _ if quote == Some(letter) => quote = None,
+            _ if quote.is_some() => {}
+            '=' | ',' | '[' | ']' | '{' | '}' => dots = 0,
+            '#' => quote = Some('\n'), // a comment, to the end of the line
+            '.' => dots += 1,
+            _ => {}
+        }
+        if dots > DEEPEST_KEY {
+            return Some(at);
+        }
+    }
+    None
+}
+
 /// Says what is wrong with a text that is not TOML.
 ///
 /// `recovered` is what the parser could make of the rest: it tells where a duplicate key stood first.

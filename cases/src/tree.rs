@@ -220,10 +220,13 @@ impl Node {
     }
 }
 
-/// The entry of a list that is called `part`: by its `name`, or else its number from one.
+/// The entry of a list that is called `part`: by its `name`, or else its number from one, or else the name that an entry
+/// without one is given (source1, grains1).
 pub(crate) fn position(entries: &[Node], part: &str) -> Option<usize> {
     entries.iter().position(|entry| entry.name() == Some(part)).or_else(|| {
-        let number: usize = part.parse().ok()?;
-        (1..=entries.len()).contains(&number).then(|| number - 1)
+        let given = ["source", "grains"].into_iter().find_map(|noun| part.strip_prefix(noun));
+        let number: usize = given.unwrap_or(part).parse().ok()?;
+        let entry = entries.get(number.checked_sub(1)?)?;
+        (given.is_none() || entry.name().is_none()).then(|| number - 1)
     })
 }

@@ -65,6 +65,30 @@ fn later_errors_find_their_line() {
 }
 
 #[test]
+fn entries_without_a_name_are_found_by_the_name_they_are_given() {
+    let text = "[[source]]\nkind = \"point\"\ncharge = \"1 e\"\n[[source]]\nkind = \"point\"\ncharge = \"2 e\"\n";
+    let sets = ["source.source1.charge=3 e".to_owned()];
+    let (case, source) = Case::parse("case.toml", text, &sets).unwrap();
+    let names: Vec<&str> = case.sources.iter().map(|source| source.name.as_str()).collect();
+    assert_eq!(names, ["source1", "source2"]);
+    assert!((case.sources[0].waveform.constant / 1.602_176_634e-19 - 3.0).abs() < 1e-15); // round-off
+    assert_eq!(source.error_at("source.source2.charge", "is odd", "").line, Some(6));
+}
+
+#[test]
+fn long_values_are_shown_by_their_beginning() {
+    let points = "[0, 0, 0], ".repeat(40);
+    let wire = "[[electrode]]\nname = \"w\"\nshape = \"wire\"\nwire_radius = \"1 mm\"\n";
+    let long = fails(&format!("{wire}points = [{points}]\n")).report(Look::PLAIN);
+    assert!(long.contains("case.toml:5:") && long.len() < 300, "{long}");
+    let lines = points.replace("], ", "],\n");
+    let (_, source) =
+        Case::parse("case.toml", &format!("{wire}points = [[0, 0, 1],\n{}]\n", &lines[..11]), &[]).unwrap();
+    let first = source.error_at("electrode.w.points", "meets itself", "pull it straight").report(Look::PLAIN);
+    assert!(first.contains("^^^^^^^^^^^") && !first.contains(" 7 |"), "{first}");
+}
+
+#[test]
 fn errors_for_programs_have_all_parts() {
     let json = fails("[[electrode]]\nname = \"left\"\nshape = \"sphere\"\nradius = \"2 V\"\n").json();
     assert_eq!(json["error"]["file"], "case.toml");

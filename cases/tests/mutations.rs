@@ -172,3 +172,23 @@ fn damaged_files_never_panic_and_errors_name_the_file() {
     }
     assert!(read > 2000 && refused > 2000, "{read} read, {refused} refused: the damage should do both");
 }
+
+#[test]
+fn deep_files_do_not_exhaust_the_stack() {
+    const DEEP: usize = 100_000;
+    let ball = "[[electrode]]\nname = \"ball\"\nshape = \"sphere\"\nradius = 1\n";
+    let dots = ".a".repeat(DEEP);
+    for (text, set) in [
+        (format!("a{dots} = 1\n{ball}"), None),
+        (format!("{ball}[sweep]\na{dots} = [1]\n"), None),
+        (format!("{ball}title = {}{}\n", "[".repeat(DEEP), "]".repeat(DEEP)), None),
+        (format!("{ball}dc = {}1{}\n", "{ a = ".repeat(DEEP), "}".repeat(DEEP)), None),
+        (ball.to_owned(), Some(format!("sweep{dots}=1"))),
+        (ball.to_owned(), Some(format!("title={}", "[".repeat(DEEP)))),
+        (ball.to_owned(), Some(format!("title={{a{dots} = 1}}"))),
+    ] {
+        let sets: Vec<String> = set.into_iter().collect();
+        let error = Case::parse("case.toml", &text, &sets).unwrap_err();
+        assert!(error.report(Look::PLAIN).contains("case.toml"));
+    }
+}

@@ -42,7 +42,7 @@ const BEYOND_A_SCHEMA: &str = "\
     amplitude_in_coulombs axis_without_direction disc_hole_too_large drive_circle drive_is_a_voltage drive_phase_of_ramp \
     drive_unknown drive_unknown_in_table field_too_many_panels \
     grains_box_inside_out grains_count_missing grains_count_of_points grains_density_of_points \
-    grains_file_and_speed grains_file_empty grains_file_folder grains_file_letters grains_file_semicolons \
+    grains_file_and_speed grains_file_columns grains_file_empty grains_file_folder grains_file_letters grains_file_semicolons \
     grains_file_short_row grains_names grid_holes_and_wires grid_holes_merge grid_no_outline grid_of_nothing \
     grid_pitch_too_large grid_wire_radius_of_holes grid_wires_touch hyperbola_cut_off integrator_langevin_alone \
     langevin_not_followed drag_of_points mesh_format mesh_missing mesh_unit \

@@ -231,7 +231,7 @@ pub(crate) enum AxisName {
 }
 
 impl DirectionKeys {
-    /// The vector as given, not normalised.
+    /// The vector, its largest component of length one: then no square of it overflows.
     pub fn vector(&self) -> meshes::Vec3 {
         use meshes::Vec3;
         match self {
@@ -241,7 +241,11 @@ impl DirectionKeys {
             Self::String(AxisName::MinusX) => -Vec3::x(),
             Self::String(AxisName::MinusY) => -Vec3::y(),
             Self::String(AxisName::MinusZ) => -Vec3::z(),
-            Self::List(Tuple(components)) => Vec3::from(components.map(|component| component.value)),
+            Self::List(Tuple(components)) => {
+                let vector = Vec3::from(components.map(|component| component.value));
+                let largest = vector.amax();
+                if largest > 0.0 { vector / largest } else { vector }
+            }
         }
     }
 }

@@ -73,6 +73,9 @@ fn rows(at: &At, file: &str, columns: &[&[&str]]) -> Result<Vec<(u64, Vec<f64>)>
         let is_header = first && record.iter().all(is_word);
         first = false;
         if is_header {
+            in_order(&record, columns).map_err(|found| {
+                at.error(format!("{shown}:{line} names the columns {found}"), format!("put them in order: {takes}"))
+            })?;
             continue;
         }
         let expected = match rows.first() {
@@ -121,6 +124,21 @@ fn rows(at: &At, file: &str, columns: &[&[&str]]) -> Result<Vec<(u64, Vec<f64>)>
         return Err(at.error(format!("{shown} holds no numbers"), takes));
     }
     Ok(rows)
+}
+
+/// Whether a header that has the names of the columns has them in order; its own words for them are fine.
+fn in_order(header: &csv::StringRecord, columns: &[&[&str]]) -> Result<(), String> {
+    let word = |field: &str| {
+        let end = field.find(|c: char| !c.is_alphanumeric()).unwrap_or(field.len());
+        field[..end].to_lowercase()
+    };
+    let found: Vec<String> = header.iter().map(word).collect();
+    let shuffled = |names: &&[&str]| {
+        let mut sorted: [Vec<&str>; 2] = [names.to_vec(), found.iter().map(String::as_str).collect()];
+        sorted.iter_mut().for_each(|names| names.sort_unstable());
+        sorted[0] == sorted[1] && found != **names
+    };
+    if columns.iter().any(shuffled) { Err(found.join(",")) } else { Ok(()) }
 }
 
 /// Times and values of a sampled waveform.

@@ -43,9 +43,9 @@ fn group(at: &At, keys: &GrainKeys, n: usize) -> Result<GrainGroup, CaseError> {
             return Err(at.missing("mass", "", help));
         }
     };
-    if mass == 0.0 {
-        let at = at.key("density");
-        return Err(at.error("{value} and the radius give a mass too small for a number", "check both units"));
+    if mass == 0.0 || !mass.is_finite() {
+        let problem = format!("{{value}} and the radius give a mass of {mass} kg");
+        return Err(at.key("density").error(problem, "check the units of both"));
     }
     let (place, launch, listed) = start(at, keys)?;
     let count = match (keys.count.map(|count| count.count()), listed) {

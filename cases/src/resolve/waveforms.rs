@@ -155,6 +155,8 @@ impl Drives {
             WaveformKeys::Drive { drive, scale, phase } => {
                 let mut part = self.named(&at.key("drive"), drive, known)?.clone();
                 let factor = scale.map_or(1.0, |scale| scale.value);
+                let too_large =
+                    || at.key("scale").error("{value} times the amplitude is too large", "numbers end at 1.8e308");
                 match &mut part.part {
                     WaveformPart::Sine { amplitude, phase: own, .. }
                     | WaveformPart::Square { amplitude, phase: own, .. } => {
@@ -168,7 +170,13 @@ impl Drives {
                     WaveformPart::Ramp { amplitude, .. } => *amplitude *= factor,
                     WaveformPart::Sampled { scale, .. } => *scale *= factor,
                 }
-                Ok(part)
+                let peak = match &part.part {
+                    WaveformPart::Sine { amplitude, .. }
+                    | WaveformPart::Square { amplitude, .. }
+                    | WaveformPart::Ramp { amplitude, .. } => amplitude,
+                    WaveformPart::Sampled { scale, .. } => scale,
+                };
+                if peak.is_finite() { Ok(part) } else { Err(too_large()) }
             }
         }
     }
