@@ -1,1 +1,45 @@
 //! The case file, the pipeline that turns it into files, and the command line.
+//!
+//! * **case file**: a TOML file that says what stands where, what drives it, and which grains fly between;
+//! * **case**: the same in SI, complete and checked ([`Case`]);
+//! * **key path**: where something stands in a case file, as `electrode.left.dc`; entries of lists by their `name`, or by
+//!   number from 1. Errors speak of key paths, `--set` and `[sweep]` change them.
+//!
+//! ```
+//! use cases::{Case, Look};
+//!
+//! let text = r#"
+//! [[electrode]]
+//! name        = "left"
+//! shape       = "ring"
+//! radius      = "20 mm"
+//! wire_radius = "1 mm"
+//! rf          = { amplitude = "300 V", frequency = "60 Hz" }
+//! "#;
+//! let (case, source) = Case::parse("case.toml", text, &["electrode.left.dc=7 V".to_owned()]).unwrap();
+//! assert_eq!(case.electrodes[0].name, "left");
+//!
+//! // Whatever is found wrong later is shown where it was written.
+//! let error = source.error_at("electrode.left.radius", "the ring touches the plate", "make it smaller");
+//! assert!(error.report(Look::PLAIN).contains("case.toml:5:15"));
+//! ```
+
+pub mod case;
+mod case_source;
+mod error;
+mod explain;
+mod key_path;
+mod keys;
+pub mod quantity;
+mod reader;
+mod resolve;
+mod schema;
+mod set;
+mod suggestion;
+mod syntax;
+mod tree;
+
+pub use case::Case;
+pub use case_source::CaseSource;
+pub use error::{CaseError, Details, Look};
+pub use schema::schema;

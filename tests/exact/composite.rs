@@ -94,7 +94,7 @@ fn exact_composite_geometries() {
             .collect();
         for excitation in case.outputs["excitations"].as_array().unwrap() {
             let volts = numbers(&excitation["V"]);
-            let field = basis.combined(&[volts.clone()]);
+            let field = basis.combined(std::slice::from_ref(&volts));
             let mut samples = Samples::default();
             field.sample(&points, &mut samples);
             let mut worst = (0.0_f64, 0.0_f64);

@@ -1,0 +1,158 @@
+//! Everything in a case that is neither electrode nor source.
+
+use meshes::Vec3;
+use serde::Serialize;
+use tracer::{Launch, Place};
+
+use super::{Gas, Integrator, Method, Reflection, foreign};
+
+/// How exactly the field is computed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FieldSettings {
+    /// Wanted relative error of the field in the trap region.
+    pub accuracy: f64,
+    /// Wanted number of panels in all; `None`: to be chosen.
+    pub panels: Option<usize>,
+    /// No more panels than this.
+    pub max_panels: usize,
+    /// How the boundary condition is tested.
+    pub method: Method,
+}
+
+/// The tabulated potential.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TableSettings {
+    /// Corners of the box, m; `None`: to be chosen around the trap.
+    pub region: Option<Region>,
+    /// Wanted relative error of the tabulated field.
+    pub accuracy: f64,
+    /// Distance of nodes, m; `None`: to be chosen.
+    pub spacing: Option<f64>,
+    /// Bytes; `None`: to be chosen.
+    pub max_memory: Option<u64>,
+}
+
+/// A box with edges along the axes; in every direction `min < max`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Region {
+    /// Lower corner, m.
+    pub min: Vec3,
+    /// Upper corner, m.
+    pub max: Vec3,
+}
+
+/// Equal grains that start in the same way.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct GrainGroup {
+    /// Letters, digits, `_` and `-`; unique among groups.
+    pub name: String,
+    /// How many; at least one.
+    pub count: usize,
+    /// Of one grain, kg.
+    pub mass: f64,
+    /// Of one grain, C.
+    pub charge: f64,
+    /// Of one grain, m; zero is a point.
+    pub radius: f64,
+    /// Where they start.
+    #[serde(serialize_with = "foreign::place")]
+    pub place: Place,
+    /// How they start to move.
+    #[serde(serialize_with = "foreign::launch")]
+    pub launch: Launch,
+}
+
+/// What acts on the grains besides the field.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Forces {
+    /// Drag of the gas.
+    pub drag: Drag,
+    /// m/s².
+    pub gravity: Vec3,
+    /// On every grain, N.
+    pub constant: Vec3,
+    /// Grains repel each other.
+    pub coulomb: bool,
+    /// T.
+    pub magnetic_field: Vec3,
+    /// Temperature of the random kicks of the gas, K; then there is a drag.
+    pub langevin: Option<f64>,
+}
+
+/// Drag, which opposes the velocity v of a grain of mass m.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Drag {
+    /// No gas.
+    None,
+    /// Force = -rate m v, 1/s.
+    Rate(f64),
+    /// Force = -coefficient v, kg/s.
+    Coefficient(f64),
+    /// Viscous gas, with the slip correction. Every grain has a radius.
+    Stokes {
+        /// The gas.
+        gas: Gas,
+        /// Pa.
+        pressure: f64,
+        /// K.
+        temperature: f64,
+    },
+    /// Free molecules. Every grain has a radius.
+    Epstein {
+        /// The gas.
+        gas: Gas,
+        /// Pa.
+        pressure: f64,
+        /// K.
+        temperature: f64,
+        /// How molecules leave the grain.
+        reflection: Reflection,
+    },
+}
+
+/// How the grains are traced.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TraceSettings {
+    /// s; positive.
+    pub duration: f64,
+    /// Time on the clock of the waveforms at which they start, s.
+    pub start: f64,
+    /// Of all random numbers.
+    pub seed: u64,
+    /// How the equation of motion is integrated.
+    pub integrator: Integrator,
+    /// s; `None`: to be chosen from the accuracy.
+    pub step: Option<f64>,
+    /// Wanted relative error of the trajectories.
+    pub accuracy: f64,
+    /// Grains that leave it are lost; `None`: the tabulated box.
+    pub region: Option<Region>,
+}
+
+/// What is written.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Output {
+    /// Time between samples of the trajectories, s; `None`: to be chosen.
+    pub every: Option<f64>,
+    /// About how many nodes the written field has; `None`: to be chosen.
+    pub field_nodes: Option<usize>,
+}
+
+/// A study: the case once for each combination of values.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Sweep {
+    /// What is varied, in the order of the file; at least one.
+    pub axes: Vec<SweepAxis>,
+    /// What to report of each run.
+    pub report: Vec<String>,
+}
+
+/// One key and the values it takes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SweepAxis {
+    /// A key path of the case.
+    pub key: String,
+    /// Each as text that stands behind the `=` of a `--set`; at least one.
+    pub values: Vec<String>,
+}

@@ -1,0 +1,203 @@
+//! `[field]`, `[table]`, `[forces]`, `[trace]` and `[output]`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::value::{Count, Fraction, Vector, Whole};
+use crate::quantity::kinds::{Acceleration, Force, Length, MagneticField, Memory, Pressure, Temperature, Time};
+use crate::quantity::{Drag, NonNegative, Positive, Si};
+
+/// `[field]`
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct FieldKeys {
+    /// Wanted relative error of the field in the trap region; left out: 1e-4.
+    pub accuracy: Option<Fraction>,
+    /// Wanted number of panels in all; left out: chosen from the accuracy.
+    pub panels: Option<Count>,
+    /// No more panels than this; left out: 20000.
+    pub max_panels: Option<Count>,
+    /// How the boundary condition is tested; left out: "galerkin".
+    pub method: Option<Method>,
+}
+
+/// How the boundary condition is tested.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// On average over each panel: more exact for the same number of panels.
+    #[default]
+    Galerkin,
+    /// At the centre of each panel: faster to set up.
+    Collocation,
+}
+
+/// `[table]`
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct TableKeys {
+    /// Lower corner of the tabulated box; left out (with `max`): chosen around the trap.
+    pub min: Option<Vector<Length>>,
+    /// Upper corner.
+    pub max: Option<Vector<Length>>,
+    /// Wanted relative error of the tabulated field; left out: 1e-4.
+    pub accuracy: Option<Fraction>,
+    /// Distance of its nodes; left out: chosen from the accuracy.
+    pub spacing: Option<Positive<Length>>,
+    /// No more memory than this; left out: chosen from what the machine has.
+    pub max_memory: Option<Positive<Memory>>,
+}
+
+/// `[forces]`
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ForceKeys {
+    /// Drag of the gas: a rate as "0.1 /s", a coefficient as "1e-14 kg/s", or a model.
+    pub drag: Option<DragKeys>,
+    /// Acceleration of gravity; left out: none.
+    pub gravity: Option<Vector<Acceleration>>,
+    /// A constant force on every grain; left out: none.
+    pub constant: Option<Vector<Force>>,
+    /// Whether grains repel each other; left out: they do not.
+    pub coulomb: Option<bool>,
+    /// Magnetic field; left out: none.
+    pub magnetic_field: Option<Vector<MagneticField>>,
+    /// Temperature of the random kicks of the gas (needs `drag`); left out: no kicks.
+    pub langevin: Option<NonNegative<Temperature>>,
+}
+
+/// `drag = ...`
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(untagged)]
+pub(crate) enum DragKeys {
+    /// A rate or a coefficient.
+    Quantity(Drag),
+    /// A model.
+    Table(GasDragKeys),
+}
+
+/// Drag from the properties of the gas.
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[schemars(tag = "model")]
+pub(crate) enum GasDragKeys {
+    /// Viscous, with the slip correction: grains larger than the mean free path.
+    Stokes {
+        /// The gas.
+        gas: Gas,
+        /// Its pressure.
+        pressure: Positive<Pressure>,
+        /// Its temperature; left out: "20 degC".
+        temperature: Option<Positive<Temperature>>,
+    },
+    /// Free molecules: grains smaller than the mean free path.
+    Epstein {
+        /// The gas.
+        gas: Gas,
+        /// Its pressure.
+        pressure: Positive<Pressure>,
+        /// Its temperature; left out: "20 degC".
+        temperature: Option<Positive<Temperature>>,
+        /// How molecules leave the grain; left out: "diffuse".
+        reflection: Option<Reflection>,
+    },
+}
+
+/// A gas whose molecules and viscosity are known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Gas {
+    /// Dry air.
+    Air,
+    /// H2.
+    Hydrogen,
+    /// He.
+    Helium,
+    /// Ne.
+    Neon,
+    /// N2.
+    Nitrogen,
+    /// O2.
+    Oxygen,
+    /// Ar.
+    Argon,
+    /// CO2.
+    CarbonDioxide,
+    /// Kr.
+    Krypton,
+    /// Xe.
+    Xenon,
+}
+
+/// How molecules leave a grain.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Reflection {
+    /// Like light from a mirror.
+    Specular,
+    /// In all directions, as from real, rough grains.
+    #[default]
+    Diffuse,
+}
+
+/// `[trace]`
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct TraceKeys {
+    /// How long the grains are traced.
+    pub duration: Positive<Time>,
+    /// Time at which they start, on the clock of the waveforms; left out: 0.
+    pub start: Option<Si<Time>>,
+    /// Seed of all random numbers; left out: 1.
+    pub seed: Option<Whole<0>>,
+    /// How the equation of motion is integrated; left out: "auto".
+    pub integrator: Option<Integrator>,
+    /// Fixed (or first) time step; left out: chosen from the accuracy.
+    pub step: Option<Positive<Time>>,
+    /// Wanted relative error of the trajectories; left out: 1e-6.
+    pub accuracy: Option<Fraction>,
+    /// Grains that leave this box are lost; left out: the tabulated box.
+    pub region: Option<RegionKeys>,
+}
+
+/// A box.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RegionKeys {
+    /// Lower corner.
+    pub min: Vector<Length>,
+    /// Upper corner.
+    pub max: Vector<Length>,
+}
+
+/// How the equation of motion is integrated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Integrator {
+    /// Chosen from the forces.
+    #[default]
+    Auto,
+    /// Runge-Kutta of order 8 with adaptive steps.
+    Dop853,
+    /// Velocity Verlet.
+    Verlet,
+    /// Boris, for magnetic fields.
+    Boris,
+    /// With random kicks.
+    Langevin,
+    /// Symplectic of order 4.
+    Symplectic4,
+    /// Symplectic of order 6.
+    Symplectic6,
+}
+
+/// `[output]`
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct OutputKeys {
+    /// Time between samples of the trajectories; left out: chosen from the fastest motion.
+    pub every: Option<Positive<Time>>,
+    /// About how many nodes the written field has; left out: chosen.
+    pub field_nodes: Option<Count>,
+}
