@@ -1,5 +1,9 @@
 //! Grains in flight: ensembles, forces, integrators, how a flight ends, what is kept of it.
 
 pub mod cloud;
+pub mod constants;
+pub mod grains;
+pub mod stream;
 
-pub use cloud::{Launch, Place};
+pub use cloud::{CloudError, Group, Launch, Place, grain_id};
+pub use grains::{Ensemble, Grain, GrainError};
