@@ -6,6 +6,8 @@ pub mod drag;
 pub mod force;
 pub mod gas;
 pub mod grains;
+pub mod observer;
+pub mod outcome;
 pub mod stream;
 
 pub use cloud::{CloudError, Group, Launch, Place, grain_id};
@@ -16,3 +18,5 @@ pub use force::uniform::{ConstantForce, Gravity};
 pub use force::{Batch, Force, Nature, Scratch};
 pub use gas::{Gas, GasKind};
 pub use grains::{Ensemble, Grain, GrainError};
+pub use observer::{Nothing, Observer, Sample, Sink, Trajectories};
+pub use outcome::{Ending, Outcome};
