@@ -39,8 +39,9 @@ pub struct Options {
     /// How long, s. Default: 1.
     pub duration: f64,
     /// Relative error that a step of an adaptive integrator may make, in position (against the way the grain has come
-    /// so far) and in velocity (against the largest so far). Default: 1e-9, at which a thousand steps leave an error well
-    /// below that of the best tables of the field, 1e-6, and which costs only 1.5 times the steps of 1e-7.
+    /// so far) and in velocity (against the largest so far). Default: 1e-9. That leaves 1e-8 after 100 RF periods
+    /// (measured for q from 0.02 to 0.8), well below the 1e-6 of the best tables of a field, with 1.8 times the steps of
+    /// 1e-7.
     pub tolerance: f64,
     /// Step of the other integrators, s. Default: from the forces, see [`crate::natural_step`].
     pub step: Option<f64>,

@@ -150,6 +150,11 @@ pub(crate) fn run(
 }
 
 /// The longest step, in shortest periods of the forces.
+///
+/// *Why a quarter:* in a Paul trap with q from 0.02 to 0.8 and tolerances from 1e-6 to 1e-12 the error control by itself
+/// takes 4 to 33 steps a period, and a bound between 1/4 and 2 periods changes neither steps nor error. It is there for
+/// motions that hardly feel the RF, so that no step can run over a whole period unseen: with twelve stages in a quarter
+/// none can. A bound of 1/20 would cost five times the steps at 1e-6, half as much again at 1e-9.
 const LONGEST_STEP: f64 = 0.25;
 
 fn fly(run: &Run, grains: &[usize]) -> Result<BlockResult, TraceError> {
@@ -236,7 +241,8 @@ impl Method {
         }
     }
 
-    /// Default steps in the shortest time of the forces.
+    /// Default steps in the shortest time of the forces. On the Mathieu flights of the reference, 6 to 32 periods long,
+    /// they leave 3e-3, 5e-7 and 2e-8 of the excursion for orders 2, 4 and 6.
     fn steps_per_period(self) -> f64 {
         match self {
             Self::Auto | Self::Dop853 => 20.0,

@@ -311,3 +311,30 @@ fn exact_opposite_charges_on_a_circle() {
         assert!((traced.ensemble.positions()[k] - grains.positions()[k]).norm() < 1e-9 * r);
     }
 }
+
+/// Drag by the square of the speed, F = -m v |v|: a force that depends on the velocity.
+struct Quadratic;
+
+impl tracer::Force for Quadratic {
+    fn nature(&self) -> tracer::Nature {
+        tracer::Nature { needs_velocity: true, ..tracer::Nature::default() }
+    }
+
+    fn add(&self, batch: &tracer::Batch, _: &mut tracer::Scratch, force: &mut [meshes::Vec3]) {
+        for (i, f) in force.iter_mut().enumerate() {
+            *f -= batch.velocity[i] * (batch.mass[i] * batch.velocity[i].norm());
+        }
+    }
+}
+
+#[test]
+fn exact_force_that_depends_on_the_velocity() {
+    // v = v0 / (1 + v0 t), x = ln(1 + v0 t).
+    let system = System::new().with_force(Quadratic);
+    let (r, u) = end(&system, v(0.0, 0.0, 0.0), v(0.0, 2.0, 0.0), &options(Method::Auto, 5.0));
+    // Dozens of steps at 1e-13.
+    assert!((r.y - 11.0_f64.ln()).abs() < 1e-11 && (u.y - 2.0 / 11.0).abs() < 1e-11);
+    let grains = ensemble([grain(v(0.0, 0.0, 0.0), v(0.0, 2.0, 0.0), 1.0, 1.0)]);
+    let refused = tracer::trace(&system, &grains, &options(Method::Verlet, 5.0), &tracer::Nothing).unwrap_err();
+    assert_eq!(refused.to_string(), "verlet cannot be used: a force depends on the velocity; use dop853");
+}

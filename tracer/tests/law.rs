@@ -349,7 +349,13 @@ fn law_bad_options_are_refused_in_words() {
     );
     assert!(refused(&System::new().with_noise(300.0), good.clone()).contains("there is no drag"));
     let drag = System::new().with_drag(Drag::Coefficient(-1.0));
-    assert_eq!(refused(&drag, good), "grain 0: the drag coefficient is -1; give zero or more, in kg/s");
+    assert_eq!(refused(&drag, good.clone()), "grain 0: the drag coefficient is -1; give zero or more, in kg/s");
+    // No grains, or no time, is no mistake.
+    for system in [&system, &system.clone().with_coulomb()] {
+        assert!(trace(system, &Ensemble::new(), &good, &Nothing).unwrap().endings.is_empty());
+        let nothing = Options { duration: 0.0, method: Method::Verlet, step: Some(0.1), ..good.clone() };
+        assert_eq!(trace(system, &grains, &nothing, &Nothing).unwrap().ensemble, grains);
+    }
 }
 
 #[test]

@@ -305,6 +305,43 @@ fn law_strikes_of_a_cloud_do_not_depend_on_the_method() {
     assert!((35..85).contains(&on_wires), "{on_wires}");
     assert_eq!(struck(Method::BlanesMoan4), first);
     assert_eq!(struck(Method::BlanesMoan6), first);
+    let one_by_one = |block| run(&system, &start, &Options { block, ..options(Method::Dop853, 5.0) });
+    assert_eq!(one_by_one(1), one_by_one(64), "the same bits, strikes and all");
     let same = struck(Method::Verlet).iter().zip(&first).filter(|(a, b)| a == b).count();
     assert!(same >= 299, "Verlet's paths are off by 1e-5, wires are 2e-2 wide: {same}");
+}
+
+#[test]
+fn law_nothing_diffuses_out_of_a_closed_sphere() {
+    // Grains kicked about by a gas inside a triangulated sphere, in steps that cross a tenth of it: each strikes it or is
+    // inside when the time is up.
+    let system = System::new()
+        .with_drag(Drag::Rate(5.0))
+        .with_noise(0.05 / tracer::constants::BOLTZMANN)
+        .with_surface(Arc::new(SurfaceTree::new(&hollow(sphere(0.5, 3)))));
+    let start = ensemble((0..500).map(|_| grain(v(0.0, 0.0, 0.0), v(0.0, 0.0, 0.0), 1.0, 1.0)));
+    for step in [0.02, 0.2] {
+        let traced = run(&system, &start, &Options { step: Some(step), ..options(Method::Auto, 8.0) });
+        let mut struck = 0;
+        for (ending, p) in traced.endings.iter().zip(traced.ensemble.positions()) {
+            match ending.outcome {
+                Outcome::Struck { point, normal, .. } => {
+                    struck += 1;
+                    // Flat panels of a sphere lie up to 2 % inside it.
+                    assert!((0.48..0.500_001).contains(&point.norm()) && normal.dot(&point) > 0.0);
+                }
+                Outcome::TimeUp => assert!(p.norm() < 0.5),
+                other => panic!("{other:?}"),
+            }
+        }
+        // D = 0.01: the mean time to the wall is R²/(6 D) = 4.2.
+        assert!((300..480).contains(&struck), "{struck} at step {step}");
+    }
+}
+
+/// One closed electrode that grains may fly inside of.
+fn hollow(triangles: Vec<[Vec3; 3]>) -> SurfaceMesh {
+    let mut mesh = mesh(&[(true, triangles)]);
+    mesh.electrodes[0].hollow = true;
+    mesh
 }
