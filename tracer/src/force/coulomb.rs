@@ -235,6 +235,28 @@ mod tests {
     }
 
     #[test]
+    fn every_width_of_vector_gives_the_same_bits() {
+        let cloud = Cloud::new(77);
+        let sources = Sources::new(&cloud.batch());
+        let tile = |first| Tile { sources: &sources, first };
+        for first in [0, 32, 64] {
+            let one = Simd::vectorize(pulp::Scalar::new(), tile(first));
+            let mut others = vec![Arch::new().dispatch(tile(first))];
+            #[cfg(target_arch = "x86_64")]
+            {
+                others.extend(pulp::x86::V3::try_new().map(|simd| Simd::vectorize(simd, tile(first))));
+                others.extend(pulp::x86::V4::try_new().map(|simd| Simd::vectorize(simd, tile(first))));
+            }
+            let lanes = (77 - first).min(TILE);
+            for other in others {
+                for (a, b) in [(&one.x, &other.x), (&one.y, &other.y), (&one.z, &other.z)] {
+                    assert_eq!(a[..lanes], b[..lanes]);
+                }
+            }
+        }
+    }
+
+    #[test]
     fn forces_of_a_cloud_add_up_to_nothing_and_follow_the_energy() {
         let cloud = Cloud::new(60);
         let force = fast(&cloud);
