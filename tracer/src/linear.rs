@@ -110,7 +110,7 @@ fn expm1(z: Complex<f64>) -> Complex<f64> {
 /// So a free grain diffuses as it should whatever γ h is.
 ///
 /// Source: Ornstein and Uhlenbeck 1930; Chandrasekhar 1943 (joint distribution); Gillespie 1996 (exact update). Checked
-/// by `noise_has_the_covariances_of_many_small_steps` and `law_free_grain_diffuses`.
+/// by `noise_has_the_covariances_of_many_small_steps` and `law_noise_makes_the_thermal_speed_and_free_diffusion`.
 #[derive(Clone, Copy, Debug)]
 pub struct NoisyFlow {
     flow: LinearFlow,

@@ -17,7 +17,7 @@ use crate::stream::{Purpose, Stream};
 ///
 /// Source: the scheme called BUB in Sanz-Serna and Zygalakis, "Wasserstein distance estimates for the distributions of
 /// numerical approximations to ergodic stochastic differential equations", JMLR 22 (2021). Checked by
-/// `order_langevin_in_a_well` and `law_*` of `langevin.rs`.
+/// `order_langevin_in_a_well`, `law_noise_in_a_well_is_boltzmann`, `law_noise_makes_the_thermal_speed_and_free_diffusion`.
 ///
 /// *Why not BAOAB:* its drift uses the velocity as if free, so that with a grain in air at γ h = 0.5 the speed of fall
 /// and the diffusion come out (γh/2) coth(γh/2) = 1.02 times too large, at γ h = 5 2.5 times. Traps in air work there.
