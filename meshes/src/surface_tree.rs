@@ -44,8 +44,14 @@ impl Bounds {
     fn meets(&self, from: &Vec3, inverse: &Vec3, s_max: f64) -> bool {
         let (mut enter, mut leave) = (0.0_f64, s_max);
         for k in 0..3 {
+            if inverse[k].is_infinite() {
+                // Parallel to these faces: in the slab or never; on a face counts as in.
+                if from[k] < self.min[k] || from[k] > self.max[k] {
+                    return false;
+                }
+                continue;
+            }
             let (a, b) = ((self.min[k] - from[k]) * inverse[k], (self.max[k] - from[k]) * inverse[k]);
-            // A ray in the plane of a face gives 0 · inf = NaN; min and max then keep the other bound, which is right.
             enter = enter.max(a.min(b));
             leave = leave.min(a.max(b));
         }
@@ -462,6 +468,24 @@ mod tests {
         assert!((tree(0).gap(&tree(1), f64::INFINITY).unwrap().0 - 0.5).abs() < 1e-15);
         assert_eq!(tree(0).gap(&tree(1), 0.4), None);
         assert_eq!(tree(1).gap(&tree(2), f64::INFINITY).unwrap().0, 0.0);
+    }
+
+    #[test]
+    fn a_ray_along_an_axis_in_the_faces_of_boxes_is_stopped() {
+        // The tree of one octahedron has two leaves, halves that share a plane through the centre; rays in it run in a face
+        // of both boxes.
+        let mesh = octahedra(&[(Vec3::zeros(), 1.0)]);
+        let tree = SurfaceTree::new(&mesh);
+        for axis in 0..3 {
+            for side in [-1.0, 1.0] {
+                for shift in [0.0, 0.25] {
+                    let across = Vec3::ith((axis + 1) % 3, shift);
+                    let (from, to) = (Vec3::ith(axis, 1.5 * side) + across, Vec3::ith(axis, -0.1 * side) + across);
+                    let hit = tree.first_hit(&from, &to).expect("the way into the octahedron is closed");
+                    assert!((hit.point - Vec3::ith(axis, (1.0 - shift) * side) - across).norm() < 1e-12);
+                }
+            }
+        }
     }
 
     #[test]

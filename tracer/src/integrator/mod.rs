@@ -1,0 +1,43 @@
+//! How a grain gets from one time to the next.
+//!
+//! | integrator | order | step | right for |
+//! |---|---|---|---|
+//! | `Dop853` | 8, dense output 7 | adaptive | anything smooth without noise |
+//! | `Verlet` | 2 | fixed | long runs, symplectic; stiff drag |
+//! | `Boris` | 2 | fixed | the customary scheme in magnetic fields |
+//! | `Langevin` | 2 (weak) | fixed | noise |
+//! | `BlanesMoan4`, `BlanesMoan6` | 4, 6 | fixed | long runs, symplectic, accurate |
+
+pub(crate) mod boris;
+pub(crate) mod dop853;
+pub(crate) mod dop853_table;
+pub(crate) mod langevin;
+pub(crate) mod splitting;
+
+use crate::block::Block;
+use crate::path::Path;
+
+/// Carries the grains of a block over the steps they try.
+pub(crate) trait Integrator {
+    /// What kind of integrator it is.
+    fn nature(&self) -> IntegratorNature;
+
+    /// Fills in what comes of each grain's trial.
+    fn advance(&mut self, block: &mut Block);
+
+    /// The ways of some grains (by lane) during the step just advanced, pushed to `paths` in that order.
+    fn paths(&mut self, block: &mut Block, lanes: &[usize], paths: &mut Vec<Path>);
+}
+
+/// What the loop over steps must know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct IntegratorNature {
+    /// Order of the error of a run in the step.
+    pub order: u32,
+    /// Estimates its error, so that steps can follow it.
+    pub adaptive: bool,
+    /// Draws random numbers.
+    pub random: bool,
+    /// Needs the acceleration at the start of a step.
+    pub starts_from_force: bool,
+}
