@@ -94,6 +94,20 @@ impl PanelSum {
         self.sources.iter().position(|s| s.is_singular_at(point))
     }
 
+    /// Adds potential and gradient of the closed-form sources in every channel at a point.
+    pub(crate) fn add_sources(&self, point: &Vec3, potential: &mut [f64], gradient: &mut [Vec3]) {
+        for (s, source) in self.sources.iter().enumerate() {
+            let (value, slope) = source.potential_and_gradient(point);
+            for c in 0..self.channels {
+                let weight = self.source_weight[s * self.channels + c];
+                if weight != 0.0 {
+                    potential[c] += weight * value;
+                    gradient[c] += slope * weight;
+                }
+            }
+        }
+    }
+
     fn add_panels(&self, point: &Vec3, potential: &mut [f64], gradient: &mut [Vec3]) {
         let per_panel = self.points.len() / self.panels.len().max(1);
         for (p, panel) in self.panels.iter().enumerate() {
@@ -154,16 +168,7 @@ impl BasisField for PanelSum {
                 continue;
             }
             self.add_panels(point, potential, gradient);
-            for (s, source) in self.sources.iter().enumerate() {
-                let (value, slope) = source.potential_and_gradient(point);
-                for c in 0..n {
-                    let weight = self.source_weight[s * n + c];
-                    if weight != 0.0 {
-                        potential[c] += weight * value;
-                        gradient[c] += slope * weight;
-                    }
-                }
-            }
+            self.add_sources(point, potential, gradient);
         }
     }
 }

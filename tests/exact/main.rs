@@ -4,3 +4,4 @@ mod capacitance;
 mod composite;
 mod panel_integrals;
 mod sphere_in_field;
+mod table;
