@@ -7,6 +7,7 @@
 pub mod basis_field;
 pub mod boundary_problem;
 pub mod capacitance;
+pub mod channels;
 pub mod constants;
 pub mod driven;
 pub mod electrode_basis;
@@ -23,6 +24,7 @@ pub mod waveform;
 pub use basis_field::{BasisField, Samples};
 pub use boundary_problem::{BoundaryProblem, SolveError, SolveReport};
 pub use capacitance::{CapacitanceDefect, CapacitanceMatrix};
+pub use channels::Channels;
 pub use driven::DrivenField;
 pub use electrode_basis::ElectrodeBasis;
 pub use linear_operator::LinearOperator;
