@@ -10,6 +10,7 @@ use meshes::SurfaceMesh;
 use rayon::prelude::*;
 
 use crate::capacitance::CapacitanceMatrix;
+use crate::coarse::coarse_capacitance;
 use crate::constants::COULOMB;
 use crate::electrode_basis::ElectrodeBasis;
 use crate::influence::{Testing, potential_coefficients};
@@ -26,6 +27,9 @@ pub struct BoundaryProblem<'a> {
     pub sources: &'a [Source],
     /// How the condition is imposed.
     pub testing: Testing,
+    /// Solve a coarser problem from the same matrix as well, for an error estimate where the surface cannot be meshed anew
+    /// (Galerkin testing only).
+    pub with_coarse: bool,
 }
 
 /// Why there is no solution.
@@ -94,7 +98,7 @@ pub struct SolveReport {
 impl<'a> BoundaryProblem<'a> {
     /// The problem of electrodes alone, with Galerkin testing.
     pub fn new(mesh: &'a SurfaceMesh) -> Self {
-        Self { mesh, sources: &[], testing: Testing::Galerkin }
+        Self { mesh, sources: &[], testing: Testing::Galerkin, with_coarse: false }
     }
 
     /// Bytes that [`BoundaryProblem::solve`] needs at its peak for that many panels and right-hand sides: the matrix, its
@@ -123,6 +127,9 @@ impl<'a> BoundaryProblem<'a> {
         let wanted = charge.clone();
         let mut matrix = potential_coefficients(&panels, self.testing);
         let assembled = Instant::now();
+        let coarse = (self.with_coarse && self.testing == Testing::Galerkin && !panels.is_empty())
+            .then(|| coarse_capacitance(mesh, &panels, &matrix))
+            .flatten();
         if !panels.is_empty() {
             self.factorise_and_solve(&mut matrix, &mut charge, name)?;
         }
@@ -151,6 +158,7 @@ impl<'a> BoundaryProblem<'a> {
             sources: self.sources.to_vec(),
             capacitance: CapacitanceMatrix::new(&charges),
             induced,
+            coarse,
             charge,
             report: SolveReport {
                 unknowns: mesh.panels(),

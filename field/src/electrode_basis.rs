@@ -7,6 +7,7 @@ use meshes::SurfaceMesh;
 
 use crate::boundary_problem::SolveReport;
 use crate::capacitance::CapacitanceMatrix;
+use crate::coarse::CoarseCapacitance;
 use crate::panel::Panel;
 use crate::panel_sum::PanelSum;
 use crate::source::Source;
@@ -27,6 +28,8 @@ pub struct ElectrodeBasis {
     pub capacitance: CapacitanceMatrix,
     /// Charge on each electrode (row) that each source (column) of strength one induces, C.
     pub induced: Vec<Vec<f64>>,
+    /// Capacitances of a coarser charge on the same surface, where they were asked for.
+    pub coarse: Option<CoarseCapacitance>,
     /// How the solution went.
     pub report: SolveReport,
 }

@@ -8,6 +8,7 @@ pub mod basis_field;
 pub mod boundary_problem;
 pub mod capacitance;
 pub mod channels;
+pub mod coarse;
 pub mod constants;
 pub mod driven;
 pub mod electrode_basis;

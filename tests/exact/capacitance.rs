@@ -138,3 +138,34 @@ fn wires_hold_the_charge_of_round_ones() {
     // A hexagon of the wire's surface area would miss by 4.0 % in radius, 4.0 % / ln(8 R/a) = 6e-3 in capacitance.
     assert!((got / exact - 1.0).abs() < 2.5e-3, "{}", got / exact - 1.0);
 }
+
+#[test]
+fn the_coarser_charge_tells_the_error() {
+    // A uniform mesh of a square, as an imported one may be: the estimate from groups of panels against the true error.
+    let n = 24;
+    let at = |i: usize, j: usize| (i * (n + 1) + j) as u32;
+    let mut square = meshes::Triangulation::default();
+    for i in 0..=n {
+        for j in 0..=n {
+            square.vertices.push(Vec3::new(i as f64 / n as f64, j as f64 / n as f64, 0.0));
+        }
+    }
+    for i in 0..n {
+        for j in 0..n {
+            let corners = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            square.triangles.extend([[corners[0], corners[1], corners[2]], [corners[0], corners[2], corners[3]]]);
+        }
+    }
+    let mesh = SurfaceMesh::assemble([("square".to_string(), square)]);
+    let basis = BoundaryProblem { with_coarse: true, ..BoundaryProblem::new(&mesh) }.solve().unwrap();
+    let exact =
+        reference("capacitance.json").iter().find(|c| c.id == "square_plate.side=1").unwrap().output("C_over_4pi_eps0");
+    let coarse = basis.coarse.unwrap();
+    let (fine, coarser) = (basis.capacitance.matrix[0][0] * COULOMB, coarse.matrix[0][0] * COULOMB);
+    let error = (exact - fine) / exact;
+    let estimate = (fine - coarser) / fine / (coarse.size_ratio - 1.0);
+    println!("true error {error:.2e}, estimate {estimate:.2e}, groups of {:.2}", coarse.size_ratio.powi(2));
+    assert!(coarser < fine && fine < exact, "coarser charges give less capacitance");
+    // First order (charge at a free edge, uniform panels): right within a factor of two.
+    assert!((0.5..2.0).contains(&(estimate / error)));
+}

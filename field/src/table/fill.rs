@@ -251,7 +251,8 @@ impl<'a> Filler<'a> {
             .filter_map(|part| {
                 let first = std::array::from_fn(|k| cube.first[k] + (part >> k & 1) * half);
                 let inside = (0..3).all(|k| first[k] < self.grid.cells[k]);
-                inside.then(|| (Cube { first, edge: half }, near.to_vec(), &self.handed_down[part] * expansion))
+                let handed = || product(self.handed_down[part].as_ref(), expansion.as_ref());
+                inside.then(|| (Cube { first, edge: half }, near.to_vec(), handed()))
             })
             .collect()
     }
