@@ -30,6 +30,8 @@ mod error;
 mod explain;
 mod key_path;
 mod keys;
+pub mod output;
+pub mod pipeline;
 pub mod quantity;
 mod reader;
 mod resolve;

@@ -126,7 +126,7 @@ pub struct TraceSettings {
     pub step: Option<f64>,
     /// Wanted relative error of the trajectories.
     pub accuracy: f64,
-    /// Grains that leave it are lost; `None`: the tabulated box.
+    /// Grains that leave it are lost; `None`: half as large again on every side as all that stands in the case.
     pub region: Option<Region>,
 }
 

@@ -11,11 +11,11 @@ use crate::quantity::{Drag, NonNegative, Positive, Si};
 #[derive(Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct FieldKeys {
-    /// Wanted relative error of the field in the trap region; left out: 1e-4.
+    /// Wanted relative error of the field in the trap region; left out: 1e-3.
     pub accuracy: Option<Fraction>,
     /// Wanted number of panels in all; left out: chosen from the accuracy.
     pub panels: Option<Count>,
-    /// No more panels than this; left out: 20000.
+    /// No more panels than this; left out: 8000 (0.5 GB).
     pub max_panels: Option<Count>,
     /// How the boundary condition is tested; left out: "galerkin".
     pub method: Option<Method>,
@@ -40,7 +40,7 @@ pub(crate) struct TableKeys {
     pub min: Option<Vector<Length>>,
     /// Upper corner.
     pub max: Option<Vector<Length>>,
-    /// Wanted relative error of the tabulated field; left out: 1e-4.
+    /// Wanted relative error of the tabulated field; left out: that of `field.accuracy`.
     pub accuracy: Option<Fraction>,
     /// Distance of its nodes; left out: chosen from the accuracy.
     pub spacing: Option<Positive<Length>>,
@@ -157,7 +157,7 @@ pub(crate) struct TraceKeys {
     pub step: Option<Positive<Time>>,
     /// Wanted relative error of the trajectories; left out: 1e-6.
     pub accuracy: Option<Fraction>,
-    /// Grains that leave this box are lost; left out: the tabulated box.
+    /// Grains that leave this box are lost; left out: half as large again on every side as all that stands in the case.
     pub region: Option<RegionKeys>,
 }
 

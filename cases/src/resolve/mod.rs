@@ -38,12 +38,13 @@ pub(crate) fn case(source: &CaseSource) -> Result<Case, CaseError> {
     let grains = grains::groups(&root.key("grains"), &keys.grains)?;
     let forces = settings::forces(&root.key("forces"), &keys.forces, &grains)?;
     let trace = settings::trace(&root, keys.trace.as_ref(), &grains, &forces)?;
+    let field = settings::field(&root.key("field"), &keys.field)?;
     Ok(Case {
         title: keys.title.unwrap_or_default(),
         electrodes,
         sources,
-        field: settings::field(&root.key("field"), &keys.field)?,
-        table: settings::table(&root.key("table"), &keys.table)?,
+        table: settings::table(&root.key("table"), &keys.table, &field)?,
+        field,
         grains,
         forces,
         trace,

@@ -9,10 +9,11 @@ use crate::keys::settings::{DragKeys, FieldKeys, ForceKeys, GasDragKeys, OutputK
 use crate::keys::value::Vector;
 use crate::quantity::Kind;
 
-/// Wanted relative error of field and table: a tenth of what one usually knows of the real electrodes (0.1 %).
-const FIELD_ACCURACY: f64 = 1e-4;
-/// A dense matrix of 20000 unknowns takes 3.2 GB, what a laptop has to spare.
-const MAX_PANELS: usize = 20_000;
+/// Wanted relative error of the field: what one usually knows of real electrodes, and what constant charge on a few thousand
+/// panels gives in seconds.
+const FIELD_ACCURACY: f64 = 1e-3;
+/// A dense matrix of 8000 unknowns takes half a gigabyte and some ten seconds on two cores.
+const MAX_PANELS: usize = 8_000;
 /// Wanted relative error of trajectories: well below that of the field, so that it is not noticed beside it.
 const TRACE_ACCURACY: f64 = 1e-6;
 /// "20 degC", K.
@@ -29,7 +30,7 @@ pub(super) fn field(at: &At, keys: &FieldKeys) -> Result<FieldSettings, CaseErro
     Ok(FieldSettings { accuracy, panels, max_panels, method: keys.method.unwrap_or_default() })
 }
 
-pub(super) fn table(at: &At, keys: &TableKeys) -> Result<TableSettings, CaseError> {
+pub(super) fn table(at: &At, keys: &TableKeys, field: &FieldSettings) -> Result<TableSettings, CaseError> {
     let region = match (&keys.min, &keys.max) {
         (Some(min), Some(max)) => Some(region(at, min, max)?),
         (None, None) => None,
@@ -43,7 +44,7 @@ pub(super) fn table(at: &At, keys: &TableKeys) -> Result<TableSettings, CaseErro
     }
     Ok(TableSettings {
         region,
-        accuracy: keys.accuracy.map_or(FIELD_ACCURACY, |accuracy| accuracy.value),
+        accuracy: keys.accuracy.map_or(field.accuracy, |accuracy| accuracy.value),
         spacing: keys.spacing.map(|spacing| spacing.value),
         // A fraction of a byte means nothing.
         max_memory: keys.max_memory.map(|bytes| bytes.value.ceil() as u64),

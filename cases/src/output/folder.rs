@@ -1,0 +1,204 @@
+//! Files that appear under their final names only when they are whole.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::pipeline::Failure;
+
+/// What a file is called while it is written, between the dot and this ending.
+const PARTIAL: &str = ".partial";
+
+/// A folder of results. Files are written under temporary names and get their own all together, in [`OutputFolder::commit`]:
+/// a run that ends early, however it ends, changes nothing of what was there before.
+#[derive(Debug)]
+pub struct OutputFolder {
+    path: PathBuf,
+    /// Names within the folder, in the order they were written.
+    written: Vec<String>,
+}
+
+impl OutputFolder {
+    /// Makes the folder if need be, and clears away what an earlier run that was killed left unfinished.
+    ///
+    /// # Errors
+    /// The folder cannot be made or written to.
+    pub fn create(path: &Path) -> Result<Self, Failure> {
+        let failed = |error: io::Error| {
+            Failure::run(
+                format!("the output folder {} cannot be written: {}", path.display(), plain(&error)),
+                "give another one with -o DIR",
+            )
+        };
+        fs::create_dir_all(path).map_err(failed)?;
+        remove_partial(path);
+        remove_partial(&path.join("grains"));
+        // Better to know now than after the work.
+        let probe = path.join(format!(".probe-{}{PARTIAL}", std::process::id()));
+        File::create(&probe).map_err(failed)?;
+        let _ = fs::remove_file(&probe);
+        Ok(Self { path: path.to_owned(), written: Vec::new() })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Names of what has been written so far.
+    pub fn names(&self) -> &[String] {
+        &self.written
+    }
+
+    /// Writes a file under a temporary name. `name` may have one folder in it, as `grains/grains_0001.vtp`.
+    ///
+    /// # Errors
+    /// The content cannot be made, or the disk refuses it (it may be full).
+    pub fn write<E: std::fmt::Display>(
+        &mut self,
+        name: &str,
+        content: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+    ) -> Result<(), Failure> {
+        let temporary = self.temporary(name);
+        let failed = |what: String| {
+            let help = "make room on the disk, or write elsewhere with -o DIR";
+            Failure::run(format!("{} cannot be written: {what}", self.path.join(name).display()), help)
+        };
+        if let Some(folder) = temporary.parent() {
+            fs::create_dir_all(folder).map_err(|error| failed(plain(&error)))?;
+        }
+        let file = File::create(&temporary).map_err(|error| failed(plain(&error)))?;
+        let mut out = BufWriter::with_capacity(1 << 18, file);
+        content(&mut out).map_err(|error| failed(error.to_string()))?;
+        out.flush().map_err(|error| failed(plain(&error)))?;
+        self.written.push(name.to_owned());
+        Ok(())
+    }
+
+    /// Gives every file its own name. Files of an earlier run in `grains/` that this one did not write go away.
+    ///
+    /// # Errors
+    /// A file cannot be renamed.
+    pub fn commit(mut self) -> Result<Vec<PathBuf>, Failure> {
+        let mut paths = Vec::with_capacity(self.written.len());
+        for name in std::mem::take(&mut self.written) {
+            let path = self.path.join(&name);
+            fs::rename(self.temporary(&name), &path).map_err(|error| {
+                Failure::run(
+                    format!("{} cannot be written: {}", path.display(), plain(&error)),
+                    "is it open in another program, or is there a folder of that name?",
+                )
+            })?;
+            paths.push(path);
+        }
+        self.remove_old_frames(&paths);
+        Ok(paths)
+    }
+
+    /// Removes animation frames (files we name) that no longer belong to the run.
+    fn remove_old_frames(&self, current: &[PathBuf]) {
+        let Ok(entries) = fs::read_dir(self.path.join("grains")) else { return };
+        for entry in entries.flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let ours = name.strip_prefix("grains_").and_then(|rest| rest.strip_suffix(".vtp"));
+            let frame = ours.is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()));
+            if frame && !current.contains(&entry.path()) {
+                let _ = fs::remove_file(entry.path());
+            }
+        }
+    }
+
+    fn temporary(&self, name: &str) -> PathBuf {
+        let path = self.path.join(name);
+        let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        path.with_file_name(format!(".{file}{PARTIAL}"))
+    }
+}
+
+impl Drop for OutputFolder {
+    /// What was not committed goes away.
+    fn drop(&mut self) {
+        for name in &self.written {
+            let _ = fs::remove_file(self.temporary(name));
+        }
+        remove_partial(&self.path);
+        remove_partial(&self.path.join("grains"));
+    }
+}
+
+/// Removes unfinished files in a folder.
+pub fn remove_partial(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with('.') && name.ends_with(PARTIAL) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// An error of the system without its number.
+fn plain(error: &io::Error) -> String {
+    error.to_string().split(" (os error").next().unwrap_or_default().to_lowercase()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(name: &str) -> PathBuf {
+        let path = std::env::temp_dir().join(format!("graintrap-{name}-{}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        path
+    }
+
+    fn put(out: &mut OutputFolder, name: &str, text: &str) {
+        out.write(name, |w| w.write_all(text.as_bytes())).unwrap();
+    }
+
+    #[test]
+    fn nothing_appears_before_the_end_and_everything_after() {
+        let path = folder("commit");
+        let mut out = OutputFolder::create(&path).unwrap();
+        put(&mut out, "a.txt", "new");
+        put(&mut out, "grains/grains_0001.vtp", "frame");
+        assert!(!path.join("a.txt").exists());
+        assert_eq!(out.commit().unwrap().len(), 2);
+        assert_eq!(fs::read_to_string(path.join("a.txt")).unwrap(), "new");
+        // The next run has fewer frames; a file of the user's stays.
+        fs::write(path.join("grains/notes.txt"), "mine").unwrap();
+        let mut out = OutputFolder::create(&path).unwrap();
+        put(&mut out, "grains/grains_0000.vtp", "frame");
+        out.commit().unwrap();
+        let left = |name: &str| path.join("grains").join(name).exists();
+        assert!(left("grains_0000.vtp") && left("notes.txt") && !left("grains_0001.vtp"));
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn a_run_that_fails_leaves_what_was_there() {
+        let path = folder("fail");
+        let mut out = OutputFolder::create(&path).unwrap();
+        put(&mut out, "a.txt", "old");
+        out.commit().unwrap();
+        let mut out = OutputFolder::create(&path).unwrap();
+        put(&mut out, "a.txt", "new");
+        let failure = out.write("b.txt", |w| w.write_all(b"half").and(Err(io::Error::other("no space left"))));
+        assert!(failure.unwrap_err().to_string().contains("b.txt cannot be written: no space left"));
+        drop(out);
+        let names: Vec<_> = fs::read_dir(&path).unwrap().flatten().map(|e| e.file_name()).collect();
+        assert_eq!(names, ["a.txt"]);
+        assert_eq!(fs::read_to_string(path.join("a.txt")).unwrap(), "old");
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_made_is_told_before_the_work() {
+        let path = folder("file");
+        fs::write(&path, "a file").unwrap();
+        let error = OutputFolder::create(&path.join("sub")).unwrap_err();
+        assert!(error.to_string().contains("cannot be written"), "{error}");
+        fs::remove_file(path).unwrap();
+    }
+}

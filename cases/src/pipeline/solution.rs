@@ -1,0 +1,275 @@
+//! The unit solutions of a case, to the accuracy it asks for.
+
+use std::time::Instant;
+
+use field::influence::Testing;
+use field::{BasisField, BoundaryProblem, ElectrodeBasis, Samples, SolveError, Source};
+use meshes::{SurfaceMesh, Vec3};
+
+use super::surface::{Electrodes, check_contacts};
+use super::{Failure, Reporter, drives, memory, region};
+use crate::CaseSource;
+use crate::case::{Case, Method};
+
+/// A solved case.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// The unit solutions, with their mesh.
+    pub basis: ElectrodeBasis,
+    /// Estimated relative error: the larger of those of the capacitance matrix (against its largest entry) and of the unit
+    /// fields at points in the trap region (against the strongest of each), between two meshes.
+    pub error_estimate: f64,
+    /// How the estimate was found.
+    pub estimated_by: &'static str,
+    /// Time spent meshing, s.
+    pub mesh_seconds: f64,
+    /// Time spent solving, all meshes together, s.
+    pub solve_seconds: f64,
+}
+
+/// Fineness to begin with for an accuracy: with 1 errors are about 1.5e-3, and they fall with the square.
+fn first_fineness(accuracy: f64) -> f64 {
+    (1.5e-3 / accuracy).sqrt().clamp(0.7, 8.0)
+}
+
+/// How much coarser the second mesh is from which the error is estimated: coarse enough to cost little, an eighth of the
+/// time, and fine enough to be in the range where errors fall with the square of the panel size.
+const COARSER: f64 = 1.5;
+
+/// Largest number of solutions on the way to the accuracy.
+const ROUNDS: usize = 3;
+
+/// Solves a case. `wanted_panels` overrides accuracy when the case pins it.
+///
+/// # Errors
+/// A geometry that cannot be, work that does not fit in memory, equations that cannot be solved.
+pub fn solve(case: &Case, source: &CaseSource, reporter: &dyn Reporter) -> Result<Solution, Failure> {
+    let mut work = Work {
+        case,
+        source,
+        reporter,
+        sources: drives::sources(case, source)?,
+        electrodes: Electrodes::new(case, source, reporter)?,
+        mesh_seconds: 0.0,
+        solve_seconds: 0.0,
+    };
+    reporter.stage("mesh");
+    let first = work.mesh(1.0, 1.0)?;
+    check_contacts(&first, case, source, reporter)?;
+    work.electrodes.emphasise_gaps(case, &first, reporter);
+    if case.electrodes.is_empty() {
+        let basis = work.solve(&first, false)?;
+        return Ok(work.done(basis, 0.0, "closed form"));
+    }
+    let mut fineness = match case.field.panels {
+        Some(panels) => work.electrodes.fineness_for(case, source, panels)?,
+        None => first_fineness(case.field.accuracy),
+    };
+    let pinned = case.field.panels.is_some() || case.electrodes.iter().all(|e| e.panels.is_some());
+    let mut mesh = work.mesh(fineness, 1.0)?;
+    if !pinned && mesh.panels() > case.field.max_panels && !work.electrodes.any_imported() {
+        fineness = work.electrodes.fineness_for(case, source, case.field.max_panels * 19 / 20)?;
+        mesh = work.mesh(fineness, 1.0)?;
+    }
+    for round in 1.. {
+        work.check_size(&mesh)?;
+        let imported = work.electrodes.any_imported();
+        reporter.stage(&format!("solve {} panels", mesh.panels()));
+        let basis = work.solve(&mesh, imported)?;
+        let (error, how) = if imported {
+            (work.error_from_groups(&basis), "groups of panels")
+        } else {
+            (work.error_from_coarser_mesh(&basis, fineness)?, "a coarser mesh")
+        };
+        if error <= case.field.accuracy || pinned || imported || round == ROUNDS {
+            work.warn_if_missed(error, mesh.panels());
+            return Ok(work.done(basis, error, how));
+        }
+        // Errors fall with the square of the panel size; a little more than needed, since the estimate is one.
+        let mut finer = fineness * (1.2 * error / case.field.accuracy).sqrt().clamp(1.15, 2.5);
+        mesh = work.mesh(finer, 1.0)?;
+        if mesh.panels() > case.field.max_panels {
+            finer = work.electrodes.fineness_for(case, source, case.field.max_panels * 19 / 20)?;
+            mesh = work.mesh(finer, 1.0)?;
+        }
+        if finer <= 1.02 * fineness {
+            work.warn_if_missed(error, basis.panels.len());
+            return Ok(work.done(basis, error, how));
+        }
+        fineness = finer;
+    }
+    unreachable!("the last round returns")
+}
+
+struct Work<'a> {
+    case: &'a Case,
+    source: &'a CaseSource,
+    reporter: &'a dyn Reporter,
+    sources: Vec<Source>,
+    electrodes: Electrodes,
+    mesh_seconds: f64,
+    solve_seconds: f64,
+}
+
+impl Work<'_> {
+    fn mesh(&mut self, fineness: f64, share: f64) -> Result<SurfaceMesh, Failure> {
+        let start = Instant::now();
+        let mesh = self.electrodes.mesh(self.case, self.source, fineness, share)?;
+        self.mesh_seconds += start.elapsed().as_secs_f64();
+        Ok(mesh)
+    }
+
+    fn solve(&mut self, mesh: &SurfaceMesh, with_coarse: bool) -> Result<ElectrodeBasis, Failure> {
+        let start = Instant::now();
+        let testing = match self.case.field.method {
+            Method::Galerkin => Testing::Galerkin,
+            Method::Collocation => Testing::Collocation,
+        };
+        let problem = BoundaryProblem { mesh, sources: &self.sources, testing, with_coarse };
+        let basis = problem.solve().map_err(|error| self.explained(error))?;
+        self.solve_seconds += start.elapsed().as_secs_f64();
+        Ok(basis)
+    }
+
+    fn explained(&self, error: SolveError) -> Failure {
+        let text = error.to_string();
+        match error {
+            SolveError::SourceOnElectrode { source_number, .. } => {
+                let name = &self.case.sources[source_number - 1].name;
+                self.source.error_at(&format!("source.{name}.center"), text, "move the source off the electrode").into()
+            }
+            SolveError::Degenerate { electrode, .. } | SolveError::NotPositiveDefinite { electrode, .. } => {
+                let help = "panels of it may lie on each other or have no area: look at it with `graintrap mesh`";
+                self.source.error_at(&format!("electrode.{electrode}"), text, help).into()
+            }
+            SolveError::Residual { .. } => {
+                Failure::run(text, "look at the mesh with `graintrap mesh`; ask for fewer or more panels")
+            }
+        }
+    }
+
+    /// Refuses a mesh that is larger than the case allows or than fits in memory.
+    fn check_size(&self, mesh: &SurfaceMesh) -> Result<(), Failure> {
+        let (panels, settings) = (mesh.panels(), &self.case.field);
+        let right_hand_sides = self.case.electrodes.len() + self.sources.len();
+        let (needed, free) = (BoundaryProblem::memory_needed(panels, right_hand_sides), memory::available());
+        let help = "use fewer panels: a larger `field.accuracy`, a smaller `field.panels`, or a coarser mesh file";
+        if needed > free {
+            let (needed, free) = (memory::people(needed), memory::people(free));
+            let problem = format!("{panels} panels need {needed} of memory for their matrix, and {free} are free");
+            return Err(self.source.error_at(self.size_key(), problem, help).into());
+        }
+        // What the case asks for panel by panel is not bounded by the default.
+        let largest = self.case.electrodes.iter().filter_map(|e| e.panels).sum::<usize>() * 13 / 10;
+        if panels > settings.max_panels * 13 / 10 && panels > largest {
+            let needed = memory::people(needed);
+            let problem = format!(
+                "the electrodes need {panels} panels ({needed} of memory), more than field.max_panels = {}",
+                settings.max_panels
+            );
+            let help = format!("raise field.max_panels if the machine is large enough, or {help}");
+            return Err(self.source.error_at(self.size_key(), problem, help).into());
+        }
+        Ok(())
+    }
+
+    /// The key that decides how many panels there are.
+    fn size_key(&self) -> &'static str {
+        if self.case.field.panels.is_some() { "field.panels" } else { "field" }
+    }
+
+    /// Solves on a coarser mesh, and takes the errors of both to fall with the square of the panel size.
+    fn error_from_coarser_mesh(&mut self, basis: &ElectrodeBasis, fineness: f64) -> Result<f64, Failure> {
+        self.reporter.stage("error estimate");
+        let mesh = self.mesh(fineness / COARSER, 1.0 / (COARSER * COARSER))?;
+        let ratio = (basis.panels.len() as f64 / mesh.panels() as f64).sqrt();
+        if ratio < 1.1 {
+            // Shapes have least numbers of panels: nothing coarser can be made, and groups of panels stand in.
+            let fine = basis.mesh.clone();
+            let again = self.solve(&fine, true)?;
+            return Ok(self.error_from_groups(&again));
+        }
+        let coarse = self.solve(&mesh, false)?;
+        let difference = matrix_difference(&basis.capacitance.matrix, &coarse.capacitance.matrix)
+            .max(self.field_difference(basis, &coarse));
+        Ok(difference / (ratio * ratio - 1.0))
+    }
+
+    fn error_from_groups(&self, basis: &ElectrodeBasis) -> f64 {
+        basis.coarse.as_ref().map_or(f64::NAN, |coarse| {
+            // Panels of an imported mesh do not shrink towards edges: first order.
+            matrix_difference(&basis.capacitance.matrix, &coarse.matrix) / (coarse.size_ratio - 1.0)
+        })
+    }
+
+    /// Largest difference of the unit fields of two solutions at points of the trap region, against the strongest of each
+    /// basis function there.
+    fn field_difference(&self, one: &ElectrodeBasis, other: &ElectrodeBasis) -> f64 {
+        let points = trap_points(self.case, one);
+        let (mut a, mut b) = (Samples::default(), Samples::default());
+        one.panel_sum().sample(&points, &mut a);
+        other.panel_sum().sample(&points, &mut b);
+        let n = one.functions();
+        (0..n)
+            .map(|k| {
+                let each = |f: &dyn Fn(usize) -> f64| (0..points.len()).map(|p| f(p * n + k)).fold(0.0, f64::max);
+                let strongest = each(&|i| a.gradient[i].norm());
+                let apart = each(&|i| (a.gradient[i] - b.gradient[i]).norm());
+                if strongest > 0.0 { apart / strongest } else { 0.0 }
+            })
+            .fold(0.0, f64::max)
+    }
+
+    fn warn_if_missed(&self, error: f64, panels: usize) {
+        let asked = self.case.field.accuracy;
+        if !(error <= 1.05 * asked) && self.case.field.panels.is_none() {
+            self.reporter.warning(&format!(
+                "the field has an estimated error of {error:.1e} with {panels} panels; {asked:.0e} was asked. Raise field.max_panels (now {}) to come nearer",
+                self.case.field.max_panels
+            ));
+        }
+    }
+
+    fn done(&self, basis: ElectrodeBasis, error_estimate: f64, estimated_by: &'static str) -> Solution {
+        let tolerance = error_estimate.max(1e-12);
+        for defect in basis.capacitance.defects(tolerance) {
+            self.reporter.warning(&format!("the capacitance matrix is not what it must be: {defect}"));
+        }
+        Solution {
+            basis,
+            error_estimate,
+            estimated_by,
+            mesh_seconds: self.mesh_seconds,
+            solve_seconds: self.solve_seconds,
+        }
+    }
+}
+
+/// Largest difference of two matrices, against the largest entry.
+fn matrix_difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
+    let largest = a.iter().flatten().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+    a.iter().flatten().zip(b.iter().flatten()).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max) / largest
+}
+
+/// Points spread over the trap region, clear of conductors: a twentieth of the box or more where there is room.
+fn trap_points(case: &Case, basis: &ElectrodeBasis) -> Vec<Vec3> {
+    let region = region::table_box(case, &basis.mesh);
+    let field = basis.panel_sum();
+    let size = region.max - region.min;
+    // The sequence of Roberts (2018) in three dimensions: even coverage, always the same.
+    let g: f64 = 1.220_744_084_605_76;
+    let step = Vec3::new(1.0 / g, 1.0 / (g * g), 1.0 / (g * g * g));
+    for clearance in [0.05, 0.02, 0.005] {
+        let reach = clearance * size.max();
+        let points: Vec<Vec3> = (1..600)
+            .map(|k| (step * k as f64).map(f64::fract))
+            .map(|part| region.min + part.component_mul(&size))
+            .filter(|p| field.tree().nearest(p, reach).is_none() && field.inside(p).is_none())
+            .take(40)
+            .collect();
+        if points.len() >= 10 {
+            return points;
+        }
+    }
+    Vec::new()
+}
