@@ -24,8 +24,10 @@
 //! assert!(error.report(Look::PLAIN).contains("case.toml:5:15"));
 //! ```
 
+pub mod cache;
 pub mod case;
 mod case_source;
+pub mod cli;
 mod error;
 mod explain;
 mod key_path;

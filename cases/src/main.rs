@@ -1,3 +1,5 @@
-//! The `graintrap` command.
+//! The command `graintrap`.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    cases::cli::main()
+}

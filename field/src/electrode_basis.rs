@@ -35,6 +35,30 @@ pub struct ElectrodeBasis {
 }
 
 impl ElectrodeBasis {
+    /// A solution that was kept: `charges` as [`ElectrodeBasis::charges`] gives them.
+    ///
+    /// # Panics
+    /// The number of charges is not that of panels times basis functions.
+    pub fn from_charges(
+        mesh: SurfaceMesh,
+        sources: Vec<Source>,
+        charges: &[f64],
+        capacitance: CapacitanceMatrix,
+        induced: Vec<Vec<f64>>,
+        report: SolveReport,
+    ) -> Self {
+        let (rows, columns) = (mesh.panels(), mesh.electrodes.len() + sources.len());
+        assert_eq!(charges.len(), rows * columns, "a charge for each panel and basis function");
+        let panels = (0..rows).map(|p| Panel::new(mesh.corners(p))).collect();
+        let charge = Mat::from_fn(rows, columns, |p, k| charges[k * rows + p]);
+        Self { mesh, panels, sources, charge, capacitance, induced, coarse: None, report }
+    }
+
+    /// The charges of all panels, basis function after basis function, C.
+    pub fn charges(&self) -> Vec<f64> {
+        (0..self.functions()).flat_map(|k| (0..self.panels.len()).map(move |p| self.charge[(p, k)])).collect()
+    }
+
     /// Number of basis functions: electrodes and sources.
     pub fn functions(&self) -> usize {
         self.mesh.electrodes.len() + self.sources.len()

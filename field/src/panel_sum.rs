@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use meshes::{ElectrodeSurface, SurfaceTree, Vec3};
+use rayon::prelude::*;
 
 use crate::constants::COULOMB;
 use crate::electrode_basis::ElectrodeBasis;
@@ -151,6 +152,9 @@ impl PanelSum {
     }
 }
 
+/// Panels times points from which on threads share the points: some hundred microseconds of work.
+const WORTH_SHARING: usize = 10_000;
+
 impl BasisField for PanelSum {
     fn channels(&self) -> usize {
         self.channels
@@ -159,16 +163,27 @@ impl BasisField for PanelSum {
     fn sample(&self, points: &[Vec3], samples: &mut Samples) {
         let n = self.channels;
         samples.reset(points.len(), n);
-        for (p, point) in points.iter().enumerate() {
-            let potential = &mut samples.potential[p * n..(p + 1) * n];
-            let gradient = &mut samples.gradient[p * n..(p + 1) * n];
+        let one = |point: &Vec3, potential: &mut [f64], gradient: &mut [Vec3]| {
             let on_surface = self.any_solid && self.tree.nearest(point, self.surface_reach).is_some();
             if let Some(electrode) = self.inside(point).filter(|_| !on_surface) {
                 potential.copy_from_slice(&self.electrode_potential[electrode * n..(electrode + 1) * n]);
-                continue;
+                return;
             }
             self.add_panels(point, potential, gradient);
             self.add_sources(point, potential, gradient);
+        };
+        if n == 0 {
+            return;
+        }
+        let all = (samples.potential.chunks_mut(n), samples.gradient.chunks_mut(n));
+        if points.len() > 1 && points.len() * self.panels.len() >= WORTH_SHARING {
+            let all = (samples.potential.par_chunks_mut(n), samples.gradient.par_chunks_mut(n));
+            points.par_iter().zip(all).for_each(|(point, (potential, gradient))| one(point, potential, gradient));
+        } else {
+            points
+                .iter()
+                .zip(all.0.zip(all.1))
+                .for_each(|(point, (potential, gradient))| one(point, potential, gradient));
         }
     }
 }

@@ -8,9 +8,8 @@ use super::Case;
 ///
 /// | cached | depends on |
 /// |---|---|
-/// | mesh, unit solutions, capacitances | `geometry` |
-/// | table of potentials | `geometry`, `table`; and `drives` where channels are merged by their time dependence |
-/// | trajectories | all four |
+/// | mesh, unit solutions, capacitances, table of unit potentials | `geometry`, `table`, `starts` |
+/// | trajectories | all |
 ///
 /// Imported meshes enter by the hash of their bytes and not by their path, so that a moved case keeps its cache.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,6 +18,8 @@ pub struct CaseParts {
     pub geometry: String,
     /// Sources without their strength, and the settings of the table.
     pub table: String,
+    /// Where grains start: a box that the case leaves open is chosen around them.
+    pub starts: String,
     /// Voltages, charges and strengths.
     pub drives: String,
     /// Grains, forces, tracing and output.
@@ -48,6 +49,7 @@ impl Case {
         CaseParts {
             geometry: json!([without("electrodes", "drive"), whole["field"]]).to_string(),
             table: json!([without("sources", "waveform"), whole["table"]]).to_string(),
+            starts: of("grains", "place").to_string(),
             drives: json!([of("electrodes", "drive"), of("sources", "waveform")]).to_string(),
             grains: json!([whole["grains"], whole["forces"], whole["trace"], whole["output"]]).to_string(),
         }

@@ -3,6 +3,7 @@
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::pipeline::Failure;
 
@@ -16,6 +17,8 @@ pub struct OutputFolder {
     path: PathBuf,
     /// Names within the folder, in the order they were written.
     written: Vec<String>,
+    /// Of those, the ones that are for people.
+    listed: Vec<String>,
 }
 
 impl OutputFolder {
@@ -31,13 +34,12 @@ impl OutputFolder {
             )
         };
         fs::create_dir_all(path).map_err(failed)?;
-        remove_partial(path);
-        remove_partial(&path.join("grains"));
+        remove_all_partial(path);
         // Better to know now than after the work.
         let probe = path.join(format!(".probe-{}{PARTIAL}", std::process::id()));
         File::create(&probe).map_err(failed)?;
         let _ = fs::remove_file(&probe);
-        Ok(Self { path: path.to_owned(), written: Vec::new() })
+        Ok(Self { path: path.to_owned(), written: Vec::new(), listed: Vec::new() })
     }
 
     /// Where it is.
@@ -45,9 +47,9 @@ impl OutputFolder {
         &self.path
     }
 
-    /// Names of what has been written so far.
+    /// Names of what has been written so far, frames of animations and kept solutions left out.
     pub fn names(&self) -> &[String] {
-        &self.written
+        &self.listed
     }
 
     /// Writes a file under a temporary name. `name` may have one folder in it, as `grains/grains_0001.vtp`.
@@ -55,6 +57,20 @@ impl OutputFolder {
     /// # Errors
     /// The content cannot be made, or the disk refuses it (it may be full).
     pub fn write<E: std::fmt::Display>(
+        &mut self,
+        name: &str,
+        content: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+    ) -> Result<(), Failure> {
+        self.write_unlisted(name, content)?;
+        self.listed.push(name.to_owned());
+        Ok(())
+    }
+
+    /// As [`OutputFolder::write`], for a file that belongs to another one or that is not for people.
+    ///
+    /// # Errors
+    /// As [`OutputFolder::write`].
+    pub fn write_unlisted<E: std::fmt::Display>(
         &mut self,
         name: &str,
         content: impl FnOnce(&mut dyn Write) -> Result<(), E>,
@@ -80,6 +96,7 @@ impl OutputFolder {
     /// # Errors
     /// A file cannot be renamed.
     pub fn commit(mut self) -> Result<Vec<PathBuf>, Failure> {
+        let _undisturbed = undisturbed();
         let mut paths = Vec::with_capacity(self.written.len());
         for name in std::mem::take(&mut self.written) {
             let path = self.path.join(&name);
@@ -115,19 +132,31 @@ impl OutputFolder {
     }
 }
 
+static COMMIT: Mutex<()> = Mutex::new(());
+
+/// Held while files get their names. Whoever means to end the process takes it first.
+pub fn undisturbed() -> MutexGuard<'static, ()> {
+    COMMIT.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 impl Drop for OutputFolder {
     /// What was not committed goes away.
     fn drop(&mut self) {
         for name in &self.written {
             let _ = fs::remove_file(self.temporary(name));
         }
-        remove_partial(&self.path);
-        remove_partial(&self.path.join("grains"));
+        remove_all_partial(&self.path);
     }
 }
 
-/// Removes unfinished files in a folder.
-pub fn remove_partial(folder: &Path) {
+/// Removes unfinished files in an output folder and the folders in it that are ours.
+pub fn remove_all_partial(folder: &Path) {
+    for part in ["", "grains", "cache"] {
+        remove_partial(&folder.join(part));
+    }
+}
+
+fn remove_partial(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
         let name = entry.file_name();

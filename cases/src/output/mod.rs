@@ -1,5 +1,10 @@
 //! What a run writes: VTK, CSV, plots, the summary.
 
+pub mod electrodes;
+pub mod field_map;
 pub mod folder;
+pub mod summary;
+pub mod tracks;
 
 pub use folder::OutputFolder;
+pub use summary::Summary;

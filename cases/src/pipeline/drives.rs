@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use field::{Channels, DrivenField, ElectrodeBasis, PotentialTable, Source, SourceKind, TabulatedField, Waveform};
+use field::{
+    BasisField, Channels, DrivenField, ElectrodeBasis, PanelSum, PotentialTable, Source, SourceKind, TabulatedField,
+    Waveform,
+};
 
 use crate::CaseSource;
 use crate::case::{Case, Drive, SourceKind as CaseSourceKind};
@@ -53,17 +56,71 @@ pub fn channels(case: &Case, basis: &ElectrodeBasis) -> Channels {
     Channels::with_floating(&waveforms, &combinations)
 }
 
-/// The exact field of a case. Without any voltage it has one channel at zero.
-pub fn exact_field(case: &Case, basis: &ElectrodeBasis) -> DrivenField {
+/// The field of a case, driven.
+#[derive(Clone)]
+pub struct Driven {
+    /// The field, tabulated or not.
+    pub field: DrivenField,
+    /// The same channels as exact sums, which also know what is inside conductors.
+    pub exact: Arc<PanelSum>,
+    /// What each channel is made of: names of electrodes and sources, as `left+right` or `left-right`.
+    pub names: Vec<String>,
+}
+
+/// The exact field of a case.
+pub fn exact_field(case: &Case, basis: &ElectrodeBasis) -> Driven {
     let channels = at_least_one(channels(case, basis), basis.functions());
-    DrivenField::new(Arc::new(basis.combined(&channels.weights)), channels.waveforms)
+    let names = channel_names(case, &channels.weights);
+    let exact = Arc::new(basis.combined(&channels.weights));
+    let shared: Arc<dyn BasisField> = exact.clone();
+    Driven { field: DrivenField::new(shared, channels.waveforms), exact, names }
 }
 
 /// The tabulated field of a case, exact where the table does not reach.
-pub fn tabulated_field(case: &Case, basis: &ElectrodeBasis, table: &PotentialTable) -> DrivenField {
+pub fn tabulated_field(case: &Case, basis: &ElectrodeBasis, table: &PotentialTable) -> Driven {
     let channels = at_least_one(channels(case, basis), basis.functions());
+    let names = channel_names(case, &channels.weights);
     let field = TabulatedField::combined(basis, table, &channels.weights);
-    DrivenField::new(Arc::new(field), channels.waveforms)
+    let exact = Arc::clone(&field.exact);
+    Driven { field: DrivenField::new(Arc::new(field), channels.waveforms), exact, names }
+}
+
+/// The voltage of each electrode and the strength of each source at a time, floating electrodes included.
+pub fn strengths(case: &Case, basis: &ElectrodeBasis, time: f64) -> Vec<f64> {
+    let channels = channels(case, basis);
+    (0..basis.functions()).map(|function| channels.waveform_of(function).value(time)).collect()
+}
+
+/// Weights below this, against the largest in a channel, are rounding: they give no name.
+const NAMELESS: f64 = 1e-9;
+
+/// Electrodes that a channel's name lists.
+const NAMED: usize = 4;
+
+/// A name for each channel, each different.
+fn channel_names(case: &Case, weights: &[Vec<f64>]) -> Vec<String> {
+    let all: Vec<&String> =
+        case.electrodes.iter().map(|e| &e.name).chain(case.sources.iter().map(|s| &s.name)).collect();
+    let mut names: Vec<String> = Vec::with_capacity(weights.len());
+    for row in weights {
+        let members: Vec<(&str, f64)> =
+            all.iter().map(|n| n.as_str()).zip(row.iter().copied()).filter(|(_, w)| w.abs() > NAMELESS).collect();
+        let mut name = String::new();
+        for (member, weight) in members.iter().take(NAMED) {
+            let sign = if *weight < 0.0 { "-" } else { "+" };
+            name += if name.is_empty() && sign == "+" { "" } else { sign };
+            name += member;
+        }
+        if members.len() > NAMED {
+            name += &format!("+{} more", members.len() - NAMED);
+        }
+        if name.is_empty() {
+            name += "none";
+        }
+        let same = names.iter().filter(|n| **n == name || n.starts_with(&format!("{name} ("))).count();
+        names.push(if same == 0 { name } else { format!("{name} ({})", same + 1) });
+    }
+    names
 }
 
 /// A field without channels would have no potential to speak of: give it one that is zero.

@@ -1,10 +1,9 @@
 //! The flights of a case's grains.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use field::{DrivenField, PanelSum};
+use field::DrivenField;
 use meshes::SurfaceTree;
 use tracer::{
     DragLaw, Ensemble, Gas, GasKind, Group, Method, Options, Region, Sample, System, TraceError, Traced, Trajectories,
@@ -63,67 +62,6 @@ pub fn ensemble(case: &Case, settings: &TraceSettings, source: &CaseSource) -> R
         })?;
     }
     Ok(ensemble)
-}
-
-/// Refuses grains that start where they cannot be: inside a conductor, outside the region, or on a source.
-///
-/// # Errors
-/// Names the group, how many of its grains, and where.
-pub fn check_starts(
-    case: &Case,
-    source: &CaseSource,
-    ensemble: &Ensemble,
-    exact: &PanelSum,
-    region: &Region,
-) -> Result<(), Failure> {
-    for (number, group) in case.grains.iter().enumerate() {
-        let members = (0..ensemble.len()).filter(|&g| ensemble.groups()[g] as usize == number);
-        let (mut inside, mut outside) = (Vec::new(), Vec::new());
-        for g in members {
-            let p = &ensemble.positions()[g];
-            if let Some(electrode) = exact.inside(p) {
-                inside.push((g, electrode));
-            } else if (0..3).any(|k| p[k] < region.min[k] || p[k] > region.max[k]) {
-                outside.push(g);
-            } else if let Some(s) = exact.singular_at(p) {
-                let name = &case.sources[s].name;
-                let problem = format!("a grain starts on the source `{name}`, where its field is infinite");
-                let key = format!("grains.{}.place", group.name);
-                return Err(source.error_at(&key, problem, "move the grains or the source").into());
-            }
-        }
-        let place = |g: usize| {
-            let p = &ensemble.positions()[g];
-            format!("({:.4}, {:.4}, {:.4}) m", p.x, p.y, p.z)
-        };
-        let of = |n: usize| {
-            if group.count == 1 { "the grain starts".into() } else { format!("{n} of {} grains start", group.count) }
-        };
-        let key = format!("grains.{}.place", group.name);
-        if let Some(&(g, electrode)) = inside.first() {
-            let electrode = &case.electrodes[electrode].name;
-            let problem = format!("{} inside the conductor `{electrode}`, one at {}", of(inside.len()), place(g));
-            let help =
-                "move or shrink the cloud; if the electrode is a chamber that grains fly in, give it hollow = true";
-            return Err(source.error_at(&key, problem, help).into());
-        }
-        if let Some(&g) = outside.first() {
-            let (lo, hi) = (region.min, region.max);
-            let problem = format!(
-                "{} outside the region ({:.3}, {:.3}, {:.3}) to ({:.3}, {:.3}, {:.3}) m, one at {}",
-                of(outside.len()),
-                lo.x,
-                lo.y,
-                lo.z,
-                hi.x,
-                hi.y,
-                hi.z,
-                place(g)
-            );
-            return Err(source.error_at(&key, problem, "move the cloud, or enlarge trace.region").into());
-        }
-    }
-    Ok(())
 }
 
 /// Time between samples: the case's, or such that flights have some hundred samples and RF periods a score.
@@ -198,7 +136,7 @@ fn drag(drag: &Drag) -> Option<tracer::Drag> {
 /// Traces the grains of a case.
 ///
 /// # Errors
-/// An integrator that cannot do what the forces ask, a tolerance that cannot be reached, a run that was stopped.
+/// An integrator that cannot do what the forces ask, a tolerance that cannot be reached.
 #[allow(clippy::too_many_arguments)]
 pub fn fly(
     case: &Case,
@@ -208,8 +146,7 @@ pub fn fly(
     surface: Option<Arc<SurfaceTree>>,
     ensemble: &Ensemble,
     region: Region,
-    reporter: &Arc<dyn Reporter + Send + Sync>,
-    cancel: &Arc<AtomicBool>,
+    reporter: &Arc<dyn Reporter>,
 ) -> Result<Flights, Failure> {
     reporter.stage("trace");
     let start = Instant::now();
@@ -233,16 +170,12 @@ pub fn fly(
         every: Some(every),
         seed: settings.seed,
         progress: Some(Arc::new(move |done| listener.fraction(done))),
-        cancel: Some(Arc::clone(cancel)),
         ..Options::default()
     };
     // A quarter of what is free, and no more than a gigabyte: beyond that files are too large to look at.
     let limit = (memory::available() / 4).min(1 << 30) as usize;
     let observer = Trajectories::with_limit(limit);
     let traced = trace(&system, ensemble, &options, &observer).map_err(|error| explained(error, source))?;
-    if cancel.load(std::sync::atomic::Ordering::Relaxed) {
-        return Err(Failure::run("stopped before the end; no file was written", "start the run again"));
-    }
     let stride = observer.stride();
     if stride > 1 {
         reporter.warning(&format!(

@@ -7,6 +7,7 @@
 pub mod drives;
 pub mod flights;
 pub mod memory;
+pub mod ready;
 pub mod region;
 pub mod solution;
 pub mod surface;
@@ -59,7 +60,7 @@ impl Failure {
 }
 
 /// Who is told how far the work is.
-pub trait Reporter: Sync {
+pub trait Reporter: Send + Sync {
     /// A stage begins.
     fn stage(&self, name: &str);
 
@@ -68,11 +69,6 @@ pub trait Reporter: Sync {
 
     /// Something a person should know, though the run goes on.
     fn warning(&self, text: &str);
-
-    /// Whether the work should stop as soon as it can.
-    fn stopped(&self) -> bool {
-        false
-    }
 }
 
 /// Tells nobody.

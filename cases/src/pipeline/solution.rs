@@ -6,8 +6,9 @@ use field::influence::Testing;
 use field::{BasisField, BoundaryProblem, ElectrodeBasis, Samples, SolveError, Source};
 use meshes::{SurfaceMesh, Vec3};
 
-use super::surface::{Electrodes, check_contacts};
-use super::{Failure, Reporter, drives, memory, region};
+use super::ready::Ready;
+use super::surface::Electrodes;
+use super::{Failure, Reporter, memory, region};
 use crate::CaseSource;
 use crate::case::{Case, Method};
 
@@ -20,7 +21,7 @@ pub struct Solution {
     /// fields at points in the trap region (against the strongest of each), between two meshes.
     pub error_estimate: f64,
     /// How the estimate was found.
-    pub estimated_by: &'static str,
+    pub estimated_by: String,
     /// Time spent meshing, s.
     pub mesh_seconds: f64,
     /// Time spent solving, all meshes together, s.
@@ -39,38 +40,26 @@ const COARSER: f64 = 1.5;
 /// Largest number of solutions on the way to the accuracy.
 const ROUNDS: usize = 3;
 
-/// Solves a case. `wanted_panels` overrides accuracy when the case pins it.
+/// Solves a case. Panels that the case pins come before its accuracy.
 ///
 /// # Errors
 /// A geometry that cannot be, work that does not fit in memory, equations that cannot be solved.
-pub fn solve(case: &Case, source: &CaseSource, reporter: &dyn Reporter) -> Result<Solution, Failure> {
+pub fn solve(case: &Case, source: &CaseSource, ready: &Ready, reporter: &dyn Reporter) -> Result<Solution, Failure> {
     let mut work = Work {
         case,
         source,
         reporter,
-        sources: drives::sources(case, source)?,
-        electrodes: Electrodes::new(case, source, reporter)?,
+        sources: &ready.sources,
+        electrodes: &ready.electrodes,
         mesh_seconds: 0.0,
         solve_seconds: 0.0,
     };
-    reporter.stage("mesh");
-    let first = work.mesh(1.0, 1.0)?;
-    check_contacts(&first, case, source, reporter)?;
-    work.electrodes.emphasise_gaps(case, &first, reporter);
     if case.electrodes.is_empty() {
-        let basis = work.solve(&first, false)?;
+        let basis = work.solve(&ready.mesh, false)?;
         return Ok(work.done(basis, 0.0, "closed form"));
     }
-    let mut fineness = match case.field.panels {
-        Some(panels) => work.electrodes.fineness_for(case, source, panels)?,
-        None => first_fineness(case.field.accuracy),
-    };
-    let pinned = case.field.panels.is_some() || case.electrodes.iter().all(|e| e.panels.is_some());
-    let mut mesh = work.mesh(fineness, 1.0)?;
-    if !pinned && mesh.panels() > case.field.max_panels && !work.electrodes.any_imported() {
-        fineness = work.electrodes.fineness_for(case, source, case.field.max_panels * 19 / 20)?;
-        mesh = work.mesh(fineness, 1.0)?;
-    }
+    let (mut mesh, mut fineness) = work.starting_mesh()?;
+    let pinned = is_pinned(case);
     for round in 1.. {
         work.check_size(&mesh)?;
         let imported = work.electrodes.any_imported();
@@ -101,12 +90,34 @@ pub fn solve(case: &Case, source: &CaseSource, reporter: &dyn Reporter) -> Resul
     unreachable!("the last round returns")
 }
 
+/// The mesh that [`solve`] begins with.
+///
+/// # Errors
+/// A shape that cannot be.
+pub fn starting_mesh(case: &Case, source: &CaseSource, ready: &Ready) -> Result<SurfaceMesh, Failure> {
+    let mut work = Work {
+        case,
+        source,
+        reporter: &super::Silent,
+        sources: &ready.sources,
+        electrodes: &ready.electrodes,
+        mesh_seconds: 0.0,
+        solve_seconds: 0.0,
+    };
+    Ok(work.starting_mesh()?.0)
+}
+
+/// Whether the case says how many panels there are.
+fn is_pinned(case: &Case) -> bool {
+    case.field.panels.is_some() || case.electrodes.iter().all(|e| e.panels.is_some())
+}
+
 struct Work<'a> {
     case: &'a Case,
     source: &'a CaseSource,
     reporter: &'a dyn Reporter,
-    sources: Vec<Source>,
-    electrodes: Electrodes,
+    sources: &'a [Source],
+    electrodes: &'a Electrodes,
     mesh_seconds: f64,
     solve_seconds: f64,
 }
@@ -119,13 +130,27 @@ impl Work<'_> {
         Ok(mesh)
     }
 
+    fn starting_mesh(&mut self) -> Result<(SurfaceMesh, f64), Failure> {
+        let (case, source) = (self.case, self.source);
+        let mut fineness = match case.field.panels {
+            Some(panels) => self.electrodes.fineness_for(case, source, panels)?,
+            None => first_fineness(case.field.accuracy),
+        };
+        let mut mesh = self.mesh(fineness, 1.0)?;
+        if !is_pinned(case) && mesh.panels() > case.field.max_panels && !self.electrodes.any_imported() {
+            fineness = self.electrodes.fineness_for(case, source, case.field.max_panels * 19 / 20)?;
+            mesh = self.mesh(fineness, 1.0)?;
+        }
+        Ok((mesh, fineness))
+    }
+
     fn solve(&mut self, mesh: &SurfaceMesh, with_coarse: bool) -> Result<ElectrodeBasis, Failure> {
         let start = Instant::now();
         let testing = match self.case.field.method {
             Method::Galerkin => Testing::Galerkin,
             Method::Collocation => Testing::Collocation,
         };
-        let problem = BoundaryProblem { mesh, sources: &self.sources, testing, with_coarse };
+        let problem = BoundaryProblem { mesh, sources: self.sources, testing, with_coarse };
         let basis = problem.solve().map_err(|error| self.explained(error))?;
         self.solve_seconds += start.elapsed().as_secs_f64();
         Ok(basis)
@@ -230,7 +255,7 @@ impl Work<'_> {
         }
     }
 
-    fn done(&self, basis: ElectrodeBasis, error_estimate: f64, estimated_by: &'static str) -> Solution {
+    fn done(&self, basis: ElectrodeBasis, error_estimate: f64, estimated_by: &str) -> Solution {
         let tolerance = error_estimate.max(1e-12);
         for defect in basis.capacitance.defects(tolerance) {
             self.reporter.warning(&format!("the capacitance matrix is not what it must be: {defect}"));
@@ -238,7 +263,7 @@ impl Work<'_> {
         Solution {
             basis,
             error_estimate,
-            estimated_by,
+            estimated_by: estimated_by.to_owned(),
             mesh_seconds: self.mesh_seconds,
             solve_seconds: self.solve_seconds,
         }

@@ -4,7 +4,8 @@ use std::time::Instant;
 
 use field::{ElectrodeBasis, PotentialTable, TableError, TableOptions, TableReport, tabulate};
 
-use super::{Failure, Reporter, memory, region};
+use super::ready::{table_memory, table_too_large};
+use super::{Failure, Reporter, region};
 use crate::CaseSource;
 use crate::case::Case;
 
@@ -19,10 +20,6 @@ pub struct Tabulated {
     pub seconds: f64,
 }
 
-/// Memory that a table may take when the case does not say, and no more than half of what is free: beyond this, finer cells
-/// cost more in caches than they gain.
-const USUAL_BYTES: u64 = 1 << 29;
-
 /// Tabulates the unit potentials of a case.
 ///
 /// # Errors
@@ -35,32 +32,17 @@ pub fn table(
 ) -> Result<Tabulated, Failure> {
     reporter.stage("table");
     let start = Instant::now();
-    let free = memory::available();
-    let max_bytes = match (case.table.max_memory, case.table.spacing) {
-        (Some(bytes), _) => bytes.min(free),
-        // Asked for outright: all that can be had.
-        (None, Some(_)) => free / 10 * 9,
-        (None, None) => USUAL_BYTES.min(free / 2),
-    };
     let bounds = region::table_box(case, &basis.mesh);
     let options = TableOptions {
         min: bounds.min,
         max: bounds.max,
         accuracy: case.table.accuracy,
         spacing: case.table.spacing,
-        max_bytes,
+        max_bytes: table_memory(case),
     };
     let (table, report) = tabulate(basis, &options, &|done| reporter.fraction(done)).map_err(|error| {
         let TableError::TooLarge { nodes, functions, needed, available, spacing_that_fits } = error;
-        let key = if case.table.spacing.is_some() { "table.spacing" } else { "table.max_memory" };
-        let problem = format!(
-            "a table of {nodes} nodes for {functions} electrodes and sources needs {} of memory, and {} may be used",
-            memory::people(needed),
-            memory::people(available)
-        );
-        let help =
-            format!("a spacing of {spacing_that_fits:.2e} m would fit; or make the box smaller (table.min, table.max)");
-        Failure::from(source.error_at(key, problem, help))
+        table_too_large(case, source, nodes, functions, needed, available, spacing_that_fits)
     })?;
     if report.error() > case.table.accuracy {
         reporter.warning(&format!(

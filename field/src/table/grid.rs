@@ -25,9 +25,9 @@ impl Grid {
         Vec3::from_fn(|k, _| (self.max[k] - self.min[k]) / self.cells[k] as f64)
     }
 
-    /// Number of nodes.
+    /// Number of nodes; the largest number there is where they cannot be counted.
     pub fn nodes(&self) -> usize {
-        self.cells.iter().map(|n| n + 1).product()
+        self.cells.iter().fold(1_usize, |product, n| product.saturating_mul(n.saturating_add(1)))
     }
 
     /// Number of cells.

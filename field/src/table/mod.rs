@@ -42,7 +42,12 @@ impl PotentialTable {
 
     /// Bytes of a table of so many nodes and channels.
     pub fn bytes_for(nodes: usize, channels: usize) -> u64 {
-        8 * PER_NODE as u64 * nodes as u64 * channels as u64
+        (8 * PER_NODE as u64 * channels as u64).saturating_mul(nodes as u64)
+    }
+
+    /// Bytes that [`tabulate`] takes at its peak: a third more for distances, marks and what is computed but not yet stored.
+    pub fn bytes_while_filling(nodes: usize, functions: usize) -> u64 {
+        (Self::bytes_for(nodes, functions) / 3).saturating_mul(4)
     }
 
     /// The table of combinations of channels: channel c of the answer is Σ_k `weights[c][k]` times channel k.
@@ -117,11 +122,12 @@ impl BasisField for TabulatedField {
         if left.is_empty() {
             return;
         }
+        let places: Vec<Vec3> = left.iter().map(|&p| points[p]).collect();
         let mut exact = Samples::default();
-        for p in left {
-            self.exact.sample(&points[p..=p], &mut exact);
-            samples.potential[p * n..(p + 1) * n].copy_from_slice(&exact.potential);
-            samples.gradient[p * n..(p + 1) * n].copy_from_slice(&exact.gradient);
+        self.exact.sample(&places, &mut exact);
+        for (k, p) in left.into_iter().enumerate() {
+            samples.potential[p * n..(p + 1) * n].copy_from_slice(&exact.potential[k * n..(k + 1) * n]);
+            samples.gradient[p * n..(p + 1) * n].copy_from_slice(&exact.gradient[k * n..(k + 1) * n]);
         }
     }
 }

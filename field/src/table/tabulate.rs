@@ -102,8 +102,7 @@ pub fn tabulate(
     let longest = (options.max - options.min).max();
     let bytes = |spacing: f64| {
         let nodes = Grid::new(options.min, options.max, spacing).nodes();
-        // A third for distances, marks and what is computed but not yet stored.
-        (nodes, PotentialTable::bytes_for(nodes, functions) / 3 * 4)
+        (nodes, PotentialTable::bytes_while_filling(nodes, functions))
     };
     let mut spacing = options.spacing.unwrap_or(longest / FIRST_CELLS);
     let (nodes, needed) = bytes(spacing);

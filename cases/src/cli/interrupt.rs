@@ -1,0 +1,19 @@
+//! What happens on Ctrl-C: nothing half written stays, and what was there before is left alone.
+
+use std::path::PathBuf;
+
+use crate::output::folder::{remove_all_partial, undisturbed};
+use crate::pipeline::Failure;
+
+/// From now on an interrupt removes what is unfinished in a folder and ends the process with status 1. While files get their
+/// names it waits: either all of them do or none.
+pub(super) fn clean_up_in(folder: PathBuf) -> Result<(), Failure> {
+    let handler = move || {
+        let _undisturbed = undisturbed();
+        remove_all_partial(&folder);
+        eprintln!("\nstopped: no file was written");
+        std::process::exit(1);
+    };
+    ctrlc::set_handler(handler)
+        .map_err(|error| Failure::run(format!("interrupts cannot be caught: {error}"), "start the run again"))
+}

@@ -1,0 +1,65 @@
+//! `graintrap run` and `graintrap trace`: the whole chain.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use meshes::SurfaceTree;
+
+use super::fields;
+use super::session::Session;
+use crate::cache;
+use crate::output::summary::TraceSummary;
+use crate::output::tracks;
+use crate::pipeline::flights::fly;
+use crate::pipeline::ready::{check_starts_again, flight_region, ready};
+use crate::pipeline::tables::table;
+use crate::pipeline::{Failure, Reporter};
+
+/// Mesh, solve, tabulate, trace, write; `reuse` takes solution and table from an earlier run where it can.
+pub(super) fn run(session: &Session, reuse: bool) -> Result<(), Failure> {
+    let (case, source) = (&session.case, &session.source);
+    if reuse && case.grains.is_empty() {
+        let help = "add [[grains]] and [trace] to it, or use `graintrap table` to look at its field";
+        return Err(source.error_at("grains", "the case has no grains to trace", help).into());
+    }
+    let mut out = session.output()?;
+    let ready = ready(case, source, &*session.progress)?;
+    let kept = if reuse { session.kept(&ready.sources) } else { None };
+    let mut summary = session.summary(if reuse { "trace" } else { "run" });
+    let (solution, kept_table) = match kept {
+        Some((solution, table)) => {
+            check_starts_again(case, source, &ready, &solution.basis)?;
+            summary.reused.push("solution");
+            (solution, table)
+        }
+        None => (fields::solved(session, &ready)?, None),
+    };
+    let tabulated = match kept_table {
+        Some(table) => {
+            summary.reused.push("table");
+            table
+        }
+        None => table(case, source, &solution.basis, &*session.progress)?,
+    };
+    let start = Instant::now();
+    let driven = fields::write(session, &mut out, &mut summary, &solution, Some(&tabulated))?;
+    cache::write(&mut out, case, &solution, Some(&tabulated))?;
+    let mut writing = start.elapsed().as_secs_f64();
+    if let (Some(settings), Some(driven)) = (&case.trace, driven)
+        && !ready.ensemble.is_empty()
+    {
+        let mesh = &solution.basis.mesh;
+        let surface = (mesh.panels() > 0).then(|| Arc::new(SurfaceTree::new(mesh)));
+        let region = flight_region(case, mesh);
+        let reporter: Arc<dyn Reporter> = session.progress.clone();
+        let flights = fly(case, settings, source, driven.field, surface, &ready.ensemble, region, &reporter)?;
+        session.progress.stage("write");
+        let start = Instant::now();
+        tracks::write(&mut out, &flights, &ready.ensemble)?;
+        summary.trace = Some(TraceSummary::new(case, &flights));
+        summary.seconds.trace = Some(flights.seconds);
+        writing += start.elapsed().as_secs_f64();
+    }
+    summary.seconds.write = writing;
+    session.finish(out, summary)
+}

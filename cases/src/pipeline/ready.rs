@@ -1,0 +1,183 @@
+//! A case that can be run: what is wrong with its geometry is found before the long work starts.
+
+use field::{ElectrodeBasis, Grid, PotentialTable, Source};
+use meshes::{SurfaceMesh, SurfaceTree};
+use tracer::{Ensemble, Region};
+
+use super::surface::{Electrodes, check_contacts};
+use super::{Failure, Reporter, drives, flights, memory, region};
+use crate::CaseSource;
+use crate::case::Case;
+
+/// What a run starts from.
+#[derive(Clone, Debug)]
+pub struct Ready {
+    /// Electrodes, ready to be meshed at any fineness.
+    pub electrodes: Electrodes,
+    /// A first mesh of them, with the number of panels that shapes have by themselves.
+    pub mesh: SurfaceMesh,
+    /// Closed-form sources at strength one.
+    pub sources: Vec<Source>,
+    /// Grains as they start; none where nothing is traced.
+    pub ensemble: Ensemble,
+}
+
+/// Meshes the electrodes once, draws the grains, and checks that they can stand and start as they do.
+///
+/// # Errors
+/// Electrodes that touch at different voltages, shapes or mesh files that cannot be, grains that start inside a conductor,
+/// a table that fits in no memory.
+pub fn ready(case: &Case, source: &CaseSource, reporter: &dyn Reporter) -> Result<Ready, Failure> {
+    reporter.stage("mesh");
+    let sources = drives::sources(case, source)?;
+    let mut electrodes = Electrodes::new(case, source, reporter)?;
+    let mesh = electrodes.mesh(case, source, 1.0, 1.0)?;
+    check_contacts(&mesh, case, source, reporter)?;
+    electrodes.emphasise_gaps(case, &mesh, reporter);
+    check_table(case, source, &mesh, &sources)?;
+    let ensemble = match &case.trace {
+        Some(settings) => flights::ensemble(case, settings, source)?,
+        None => Ensemble::new(),
+    };
+    let bounds = flight_region(case, &mesh);
+    check_starts(case, source, &ensemble, &SurfaceTree::new(&mesh), &sources, &bounds)?;
+    Ok(Ready { electrodes, mesh, sources, ensemble })
+}
+
+/// The region in which grains are followed.
+pub fn flight_region(case: &Case, mesh: &SurfaceMesh) -> Region {
+    let bounds = region::flight_box(case, mesh);
+    Region { min: bounds.min, max: bounds.max }
+}
+
+/// Checks the starts again on the surface that is solved and struck: it is a little elsewhere than the first one.
+///
+/// # Errors
+/// As [`ready`].
+pub fn check_starts_again(
+    case: &Case,
+    source: &CaseSource,
+    ready: &Ready,
+    basis: &ElectrodeBasis,
+) -> Result<(), Failure> {
+    let bounds = flight_region(case, &basis.mesh);
+    check_starts(case, source, &ready.ensemble, &SurfaceTree::new(&basis.mesh), &ready.sources, &bounds)
+}
+
+/// Memory that a table may take when the case does not say, and no more than half of what is free: beyond this, finer cells
+/// cost more in caches than they gain.
+const USUAL_BYTES: u64 = 1 << 29;
+
+/// Memory that the table of a case may take.
+pub fn table_memory(case: &Case) -> u64 {
+    let free = memory::available();
+    match (case.table.max_memory, case.table.spacing) {
+        (Some(bytes), _) => bytes.min(free),
+        // Asked for outright: all that can be had.
+        (None, Some(_)) => free / 10 * 9,
+        (None, None) => USUAL_BYTES.min(free / 2),
+    }
+}
+
+/// Refuses a table whose spacing is given and that cannot fit.
+fn check_table(case: &Case, source: &CaseSource, mesh: &SurfaceMesh, sources: &[Source]) -> Result<(), Failure> {
+    let Some(spacing) = case.table.spacing else { return Ok(()) };
+    let bounds = region::table_box(case, mesh);
+    let functions = mesh.electrodes.len() + sources.len();
+    let available = table_memory(case);
+    let needed = |spacing: f64| {
+        let nodes = Grid::new(bounds.min, bounds.max, spacing).nodes();
+        (nodes, PotentialTable::bytes_while_filling(nodes, functions))
+    };
+    let (nodes, bytes) = needed(spacing);
+    if bytes <= available {
+        return Ok(());
+    }
+    let mut fits = spacing;
+    while needed(fits).1 > available && fits < (bounds.max - bounds.min).max() {
+        fits *= 1.05;
+    }
+    Err(table_too_large(case, source, nodes as u64, functions, bytes, available, fits))
+}
+
+/// The error of a table that does not fit.
+pub(super) fn table_too_large(
+    case: &Case,
+    source: &CaseSource,
+    nodes: u64,
+    functions: usize,
+    needed: u64,
+    available: u64,
+    fits: f64,
+) -> Failure {
+    let key = if case.table.spacing.is_some() { "table.spacing" } else { "table.max_memory" };
+    let problem = format!(
+        "a table of {nodes} nodes for {functions} electrodes and sources needs {} of memory, and {} may be used",
+        memory::people(needed),
+        memory::people(available)
+    );
+    let help = format!("a spacing of {fits:.2e} m would fit; or make the box smaller (table.min, table.max)");
+    source.error_at(key, problem, help).into()
+}
+
+/// Refuses grains that start where they cannot be: inside a conductor, outside the region, or on a source.
+///
+/// # Errors
+/// Names the group, how many of its grains, and where.
+pub fn check_starts(
+    case: &Case,
+    source: &CaseSource,
+    ensemble: &Ensemble,
+    tree: &SurfaceTree,
+    fields: &[Source],
+    region: &Region,
+) -> Result<(), Failure> {
+    for (number, group) in case.grains.iter().enumerate() {
+        let members = (0..ensemble.len()).filter(|&g| ensemble.groups()[g] as usize == number);
+        let (mut inside, mut outside) = (Vec::new(), Vec::new());
+        for g in members {
+            let p = &ensemble.positions()[g];
+            if let Some(electrode) = tree.inside(p) {
+                inside.push((g, electrode));
+            } else if (0..3).any(|k| p[k] < region.min[k] || p[k] > region.max[k]) {
+                outside.push(g);
+            } else if let Some(s) = fields.iter().position(|s| s.is_singular_at(p)) {
+                let name = &case.sources[s].name;
+                let problem = format!("a grain starts on the source `{name}`, where its field is infinite");
+                let key = format!("grains.{}.place", group.name);
+                return Err(source.error_at(&key, problem, "move the grains or the source").into());
+            }
+        }
+        let place = |g: usize| {
+            let p = &ensemble.positions()[g];
+            format!("({:.4}, {:.4}, {:.4}) m", p.x, p.y, p.z)
+        };
+        let of = |n: usize| {
+            if group.count == 1 { "the grain starts".into() } else { format!("{n} of {} grains start", group.count) }
+        };
+        let key = format!("grains.{}.place", group.name);
+        if let Some(&(g, electrode)) = inside.first() {
+            let electrode = &case.electrodes[electrode].name;
+            let problem = format!("{} inside the conductor `{electrode}`, one at {}", of(inside.len()), place(g));
+            let help =
+                "move or shrink the cloud; if the electrode is a chamber that grains fly in, give it hollow = true";
+            return Err(source.error_at(&key, problem, help).into());
+        }
+        if let Some(&g) = outside.first() {
+            let (lo, hi) = (region.min, region.max);
+            let problem = format!(
+                "{} outside the region ({:.3}, {:.3}, {:.3}) to ({:.3}, {:.3}, {:.3}) m, one at {}",
+                of(outside.len()),
+                lo.x,
+                lo.y,
+                lo.z,
+                hi.x,
+                hi.y,
+                hi.z,
+                place(g)
+            );
+            return Err(source.error_at(&key, problem, "move the cloud, or enlarge trace.region").into());
+        }
+    }
+    Ok(())
+}
