@@ -30,6 +30,7 @@ mod error;
 mod explain;
 mod key_path;
 mod keys;
+pub mod plots;
 pub mod quantity;
 mod reader;
 mod resolve;
