@@ -79,7 +79,7 @@ fn main() {
         ("offset", offset),
     ];
     for (name, tracks) in &samples {
-        write(&folder, &format!("coordinates_{name}"), &coordinates("Three grains in two coaxial rings", tracks));
-        write(&folder, &format!("phase_{name}"), &phase_planes("Three grains in two coaxial rings", tracks));
+        write(&folder, &format!("coordinates_{name}"), &coordinates("Grains in two coaxial rings", tracks));
+        write(&folder, &format!("phase_{name}"), &phase_planes("Grains in two coaxial rings", tracks));
     }
 }

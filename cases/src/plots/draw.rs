@@ -36,8 +36,13 @@ const LABEL: u32 = 16;
 const TICK: u32 = 14;
 /// White around the figure, pixels.
 const BORDER: f64 = 16.0;
-/// The smallest panel in which axes find room, pixels.
-const SMALLEST: [f64; 2] = [160.0, 120.0];
+/// Above the axes, for the label of the vertical one, and below them, for tick labels; pixels.
+const HEAD: f64 = 30.0;
+const FOOT: f64 = 32.0;
+/// Right of the axes, for half a tick label.
+const RIGHT: f64 = 26.0;
+/// The smallest axes worth looking at, pixels.
+const SMALLEST: [f64; 2] = [80.0, 50.0];
 /// An image of this side squared takes 256 MB to draw.
 const LARGEST: f64 = 8000.0;
 /// Points drawn in a figure, shared by its panels. At 12 bytes a point an SVG stays near 1.3 MB; a curve of 10⁵
@@ -97,7 +102,7 @@ pub(super) fn text(scene: &mut Scene, at: [f64; 2], content: &str, size: u32, an
         size,
         anchor,
         rotate: None,
-        bold: size == TITLE,
+        bold: false,
         color: Some(Color::from(colour)),
     });
 }
@@ -109,7 +114,7 @@ pub(super) fn mark_shape(scene: &mut Scene, shape: Shape, x: f64, y: f64) {
             d,
             fill,
             stroke: Color::from(INK),
-            stroke_width: 1.5,
+            stroke_width: 2.0,
             opacity: None,
             stroke_dasharray: None,
         }))
@@ -150,9 +155,22 @@ pub(super) fn scene(figure: &Figure) -> Result<Scene, PlotError> {
 
     let head =
         BORDER + if figure.title.is_empty() { 0.0 } else { 30.0 } + if figure.subtitle.is_empty() { 0.0 } else { 22.0 };
-    let cell = [(width - 2.0 * BORDER) / columns as f64, (height - head - BORDER - legend.height()) / rows as f64];
-    if !(cell[0] >= SMALLEST[0] && cell[1] >= SMALLEST[1]) {
-        return Err(PlotError::TooSmall { panels: figure.panels.len(), columns, width, height });
+    let too_small = || PlotError::TooSmall { panels: figure.panels.len(), columns, width, height };
+    // Rows whose horizontal axes are labelled are that much higher, so that all axes are equally high.
+    let labels: Vec<f64> =
+        figure.panels.chunks(columns).map(|row| row.iter().map(x_label_height).fold(0.0, f64::max)).collect();
+    let free = height - head - BORDER - legend.height() - labels.iter().sum::<f64>();
+    let axes_height = free / rows as f64 - HEAD - FOOT;
+    let cell_width = (width - 2.0 * BORDER) / columns as f64;
+    let axes: Vec<_> = figure.panels.iter().map(|panel| y_axis(panel, axes_height)).collect();
+    // Panels above each other share their left margin, so that equal times stand above each other.
+    let left_of = |column: usize| {
+        let chars = axes.iter().skip(column).step_by(columns).map(Axis::label_chars).max().unwrap_or(1);
+        18.0 + 0.65 * f64::from(TICK) * chars as f64
+    };
+    let room = (0..columns.min(axes.len())).map(|column| cell_width - left_of(column) - RIGHT);
+    if !(axes_height >= SMALLEST[1] && room.fold(f64::INFINITY, f64::min) >= SMALLEST[0]) {
+        return Err(too_small());
     }
 
     let mut scene = Scene::new(width.round(), height.round());
@@ -162,8 +180,7 @@ pub(super) fn scene(figure: &Figure) -> Result<Scene, PlotError> {
 
     let mut y = BORDER;
     if !figure.title.is_empty() {
-        // Bold letters are about an eighth wider than they measure.
-        let title = shortened(&figure.title, TITLE, (width - 2.0 * BORDER) / 1.15);
+        let title = shortened(&figure.title, TITLE, width - 2.0 * BORDER);
         text(&mut scene, [middle, y + 20.0], &title, TITLE, TextAnchor::Middle, INK);
         y += 30.0;
     }
@@ -172,14 +189,15 @@ pub(super) fn scene(figure: &Figure) -> Result<Scene, PlotError> {
         text(&mut scene, [middle, y + 14.0], &subtitle, SUBTITLE, TextAnchor::Middle, QUIET);
     }
 
-    let axes: Vec<_> = figure.panels.iter().map(|panel| y_axis(panel, cell[1])).collect();
-    for (i, panel) in figure.panels.iter().enumerate() {
-        // Panels above each other share their left margin, so that equal times stand above each other.
-        let column = i % columns;
-        let chars = axes.iter().skip(column).step_by(columns).map(Axis::label_chars).max().unwrap_or(1);
-        let left = 1.4 * f64::from(LABEL) + 22.0 + 0.65 * f64::from(TICK) * chars as f64;
-        let origin = [BORDER + column as f64 * cell[0], head + (i / columns) as f64 * cell[1]];
-        draw_panel(&mut scene, panel, axes[i], origin, cell, left, POINTS / figure.panels.len());
+    let mut top = head;
+    for (row, (panels, label)) in figure.panels.chunks(columns).zip(&labels).enumerate() {
+        let cell = [cell_width, HEAD + axes_height + FOOT + label];
+        for (column, panel) in panels.iter().enumerate() {
+            let origin = [BORDER + column as f64 * cell_width, top];
+            let place = Place { origin, cell, left: left_of(column), bottom: FOOT + label };
+            draw_panel(&mut scene, panel, axes[row * columns + column], &place, POINTS / axes.len());
+        }
+        top += cell[1];
     }
     legend.draw(&mut scene, middle, height - BORDER - legend.height() + 6.0);
     Ok(scene)
@@ -191,9 +209,9 @@ fn points(panel: &Panel) -> impl Iterator<Item = &[f64; 2]> {
     curves.chain(panel.marks.iter().flat_map(|mark| &mark.points)).filter(|point| drawable(point))
 }
 
-/// A tick for every 45 pixels of height.
+/// A tick for every 36 pixels of height.
 fn y_axis(panel: &Panel, height: f64) -> Axis {
-    Axis::over(points(panel).map(|p| p[1]), 0.06, (height / 45.0) as usize)
+    Axis::over(points(panel).map(|p| p[1]), 0.06, (height / 36.0) as usize)
 }
 
 /// Ticks as close as their labels allow, at most 12.
@@ -212,9 +230,22 @@ fn x_axis(panel: &Panel, width: f64) -> Axis {
     axis
 }
 
-fn draw_panel(scene: &mut Scene, panel: &Panel, y: Axis, origin: [f64; 2], cell: [f64; 2], left: f64, budget: usize) {
-    let (top, right) = (if panel.title.is_empty() { 12.0 } else { 34.0 }, 26.0);
-    let bottom = f64::from(TICK) + 18.0 + if panel.x_label.is_empty() { 0.0 } else { 1.5 * f64::from(LABEL) };
+/// Room for the label of the horizontal axis.
+fn x_label_height(panel: &Panel) -> f64 {
+    if panel.x_label.is_empty() { 0.0 } else { 1.5 * f64::from(LABEL) }
+}
+
+/// Where a panel stands on the sheet, and the margins of its axes there; pixels.
+struct Place {
+    origin: [f64; 2],
+    cell: [f64; 2],
+    left: f64,
+    bottom: f64,
+}
+
+fn draw_panel(scene: &mut Scene, panel: &Panel, y: Axis, place: &Place, budget: usize) {
+    let Place { origin, cell, left, bottom } = *place;
+    let (top, right) = (HEAD, RIGHT);
     let inner = [cell[0] - left - right, cell[1] - top - bottom];
     let x = x_axis(panel, inner[0]);
 
@@ -241,9 +272,6 @@ fn draw_panel(scene: &mut Scene, panel: &Panel, y: Axis, origin: [f64; 2], cell:
     if !panel.x_label.is_empty() {
         layout = layout.with_x_label(plain(&shortened(&panel.x_label, LABEL, inner[0])));
     }
-    if !panel.y_label.is_empty() {
-        layout = layout.with_y_label(plain(&shortened(&panel.y_label, LABEL, inner[1])));
-    }
     for band in &panel.bands {
         let [from, to] = [band.span[0].clamp(x.min, x.max), band.span[1].clamp(x.min, x.max)];
         layout = layout.with_shaded_region(ShadedRegion::vertical(from, to).with_color(GROUND).with_opacity(1.0));
@@ -259,9 +287,23 @@ fn draw_panel(scene: &mut Scene, panel: &Panel, y: Axis, origin: [f64; 2], cell:
     let clips = |element: &Primitive| matches!(element, Primitive::ClipStart { .. } | Primitive::ClipEnd);
     axes_scene.elements.into_iter().filter(|element| !clips(element)).for_each(|element| scene.add(element));
     scene.add(Primitive::GroupEnd);
+    // Bands cover the frame, so it is drawn once more.
+    scene.add(Primitive::Rect {
+        x: origin[0] + left,
+        y: origin[1] + top,
+        width: inner[0],
+        height: inner[1],
+        fill: Color::None,
+        stroke: Some(Color::from(INK)),
+        stroke_width: Some(1.0),
+        opacity: None,
+    });
+    // Upright: read without tilting the head, and sharper than turned letters.
+    let y_label = shortened(&panel.y_label, LABEL, inner[0]);
+    text(scene, [origin[0] + left, origin[1] + top - 8.0], &y_label, LABEL, TextAnchor::Start, INK);
     if !panel.title.is_empty() {
-        let title = shortened(&panel.title, LABEL, inner[0]);
-        let at = [origin[0] + left + 0.5 * inner[0], origin[1] + 22.0];
+        let title = shortened(&panel.title, LABEL, 0.5 * inner[0]);
+        let at = [origin[0] + left + 0.5 * inner[0], origin[1] + top - 8.0];
         text(scene, at, &title, LABEL, TextAnchor::Middle, INK);
     }
 }
@@ -294,7 +336,7 @@ fn plots(panel: &Panel, x: Axis, y: Axis, inner: [f64; 2], budget: usize) -> Vec
         };
         let points = mark.points.iter().filter(|point| drawable(point)).map(|p| (p[0], p[1]));
         let marks = ScatterPlot::new().with_data(points).with_marker(shape).with_size(size);
-        plots.push(marks.with_color(INK).with_marker_stroke_width(1.5).into());
+        plots.push(marks.with_color(INK).with_marker_stroke_width(2.0).into());
     }
     if plots.is_empty() {
         plots.push(LinePlot::new().into());

@@ -39,7 +39,7 @@ mod tests;
 pub enum PlotError {
     /// The panels do not fit on the sheet.
     #[error(
-        "{panels} panels in {columns} columns on {width:.0} x {height:.0} pixels; give each panel at least 160 x 120"
+        "{panels} panels in {columns} columns on {width:.0} x {height:.0} pixels leave no room for axes; make the figure larger"
     )]
     TooSmall {
         /// Number of panels.
