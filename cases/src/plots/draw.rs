@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use kuva::RasterBackend;
 use kuva::backend::svg::SvgBackend;
-use kuva::plot::{LinePlot, MarkerShape, ScatterPlot};
+use kuva::plot::{LinePlot, ScatterPlot};
 use kuva::render::annotations::ShadedRegion;
 use kuva::render::color::Color;
 use kuva::render::layout::{Layout, TickFormat};
@@ -107,7 +107,7 @@ pub(super) fn text(scene: &mut Scene, at: [f64; 2], content: &str, size: u32, an
     });
 }
 
-/// A mark in the legend, alike those on the curves.
+/// A mark, on a curve or in the legend.
 pub(super) fn mark_shape(scene: &mut Scene, shape: Shape, x: f64, y: f64) {
     let path = |d: String, fill: Option<Color>| {
         Primitive::Path(Box::new(PathData {
@@ -132,12 +132,15 @@ pub(super) fn mark_shape(scene: &mut Scene, shape: Shape, x: f64, y: f64) {
         }),
         Shape::Cross => {
             let (left, right, top, bottom) = (x - r, x + r, y - r, y + r);
-            scene.add(path(format!("M {left} {top} L {right} {bottom}"), None));
-            scene.add(path(format!("M {left} {bottom} L {right} {top}"), None));
+            scene.add(path(format!("M {left:.1} {top:.1} L {right:.1} {bottom:.1}"), None));
+            scene.add(path(format!("M {left:.1} {bottom:.1} L {right:.1} {top:.1}"), None));
         }
         Shape::Triangle => {
             let (left, right, top, bottom) = (x - r, x + r, y - r, y + r);
-            scene.add(path(format!("M {x} {top} L {right} {bottom} L {left} {bottom} Z"), Some(Color::from(INK))));
+            scene.add(path(
+                format!("M {x:.1} {top:.1} L {right:.1} {bottom:.1} L {left:.1} {bottom:.1} Z"),
+                Some(Color::from(INK)),
+            ));
         }
     }
 }
@@ -209,9 +212,9 @@ fn points(panel: &Panel) -> impl Iterator<Item = &[f64; 2]> {
     curves.chain(panel.marks.iter().flat_map(|mark| &mark.points)).filter(|point| drawable(point))
 }
 
-/// A tick for every 36 pixels of height.
+/// A tick for every 24 pixels of height, at most 12: steps of 1, 2 and 5 make that about 40.
 fn y_axis(panel: &Panel, height: f64) -> Axis {
-    Axis::over(points(panel).map(|p| p[1]), 0.06, (height / 36.0) as usize)
+    Axis::over(points(panel).map(|p| p[1]), 0.06, ((height / 24.0) as usize).min(12))
 }
 
 /// Ticks as close as their labels allow, at most 12.
@@ -287,6 +290,13 @@ fn draw_panel(scene: &mut Scene, panel: &Panel, y: Axis, place: &Place, budget: 
     let clips = |element: &Primitive| matches!(element, Primitive::ClipStart { .. } | Primitive::ClipEnd);
     axes_scene.elements.into_iter().filter(|element| !clips(element)).for_each(|element| scene.add(element));
     scene.add(Primitive::GroupEnd);
+    for mark in &panel.marks {
+        for point in mark.points.iter().filter(|point| drawable(point)) {
+            let right = (point[0] - x.min) / (x.max - x.min) * inner[0];
+            let up = (point[1] - y.min) / (y.max - y.min) * inner[1];
+            mark_shape(scene, mark.shape, origin[0] + left + right, origin[1] + top + inner[1] - up);
+        }
+    }
     // Bands cover the frame, so it is drawn once more.
     scene.add(Primitive::Rect {
         x: origin[0] + left,
@@ -308,7 +318,7 @@ fn draw_panel(scene: &mut Scene, panel: &Panel, y: Axis, place: &Place, budget: 
     }
 }
 
-/// Curves and marks of a panel, thinned to `budget` points, gaps cut out.
+/// Curves of a panel, thinned to `budget` points, gaps cut out.
 fn plots(panel: &Panel, x: Axis, y: Axis, inner: [f64; 2], budget: usize) -> Vec<Plot> {
     let mut plots = Vec::new();
     for (curve, points) in panel.curves.iter().zip(thinned(panel, x, y, inner, budget)) {
@@ -327,16 +337,6 @@ fn plots(panel: &Panel, x: Axis, y: Axis, inner: [f64; 2], budget: usize) -> Vec
                 }
             }
         }
-    }
-    for mark in &panel.marks {
-        let (shape, size) = match mark.shape {
-            Shape::Circle => (MarkerShape::Circle, 4.0),
-            Shape::Cross => (MarkerShape::Cross, 5.0),
-            Shape::Triangle => (MarkerShape::Triangle, 5.0),
-        };
-        let points = mark.points.iter().filter(|point| drawable(point)).map(|p| (p[0], p[1]));
-        let marks = ScatterPlot::new().with_data(points).with_marker(shape).with_size(size);
-        plots.push(marks.with_color(INK).with_marker_stroke_width(2.0).into());
     }
     if plots.is_empty() {
         plots.push(LinePlot::new().into());
