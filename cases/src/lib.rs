@@ -34,6 +34,7 @@ mod key_path;
 mod keys;
 pub mod output;
 pub mod pipeline;
+pub mod plots;
 pub mod quantity;
 mod reader;
 mod resolve;
