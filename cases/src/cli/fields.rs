@@ -6,7 +6,7 @@ use super::session::Session;
 use crate::cache;
 use crate::output::field_map::{FieldMap, NODES};
 use crate::output::summary::{SolveSummary, Summary, TableSummary};
-use crate::output::{OutputFolder, electrodes, field_map};
+use crate::output::{OutputFolder, electrodes, field_map, pictures};
 use crate::pipeline::drives::{Driven, strengths, tabulated_field};
 use crate::pipeline::ready::{Ready, check_starts_again, ready};
 use crate::pipeline::solution::{Solution, solve};
@@ -64,8 +64,10 @@ pub(super) fn write(
     let driven = tabulated_field(case, basis, &tabulated.table);
     check_map(session, &driven)?;
     session.progress.stage("field map");
-    let map = FieldMap::new(case, &driven, &region::table_box(case, &basis.mesh));
+    let bounds = region::table_box(case, &basis.mesh);
+    let map = FieldMap::new(case, &driven, &bounds);
     out.write(field_map::FILE, |w| map.write(w))?;
+    pictures::potential_along_axis(out, case, &session.title(), &driven, &bounds)?;
     Ok(Some(driven))
 }
 

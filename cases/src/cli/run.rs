@@ -9,7 +9,7 @@ use super::fields;
 use super::session::Session;
 use crate::cache;
 use crate::output::summary::TraceSummary;
-use crate::output::tracks;
+use crate::output::{pictures, tracks};
 use crate::pipeline::flights::fly;
 use crate::pipeline::ready::{check_starts_again, flight_region, ready};
 use crate::pipeline::tables::table;
@@ -56,6 +56,7 @@ pub(super) fn run(session: &Session, reuse: bool) -> Result<(), Failure> {
         session.progress.stage("write");
         let start = Instant::now();
         tracks::write(&mut out, &flights, &ready.ensemble)?;
+        pictures::of_flights(&mut out, &session.title(), &flights)?;
         summary.trace = Some(TraceSummary::new(case, &flights));
         summary.seconds.trace = Some(flights.seconds);
         writing += start.elapsed().as_secs_f64();

@@ -3,6 +3,7 @@
 pub mod electrodes;
 pub mod field_map;
 pub mod folder;
+pub mod pictures;
 pub mod summary;
 pub mod tracks;
 

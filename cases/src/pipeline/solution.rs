@@ -37,6 +37,9 @@ fn first_fineness(accuracy: f64) -> f64 {
 /// time, and fine enough to be in the range where errors fall with the square of the panel size.
 const COARSER: f64 = 1.5;
 
+/// Meshes whose panels differ less in size than this tell nothing of the error.
+const NEAREST: f64 = 1.1;
+
 /// Largest number of solutions on the way to the accuracy.
 const ROUNDS: usize = 3;
 
@@ -60,6 +63,7 @@ pub fn solve(case: &Case, source: &CaseSource, ready: &Ready, reporter: &dyn Rep
     }
     let (mut mesh, mut fineness) = work.starting_mesh()?;
     let pinned = is_pinned(case);
+    let mut before: Option<ElectrodeBasis> = None;
     for round in 1.. {
         work.check_size(&mesh)?;
         let imported = work.electrodes.any_imported();
@@ -68,14 +72,14 @@ pub fn solve(case: &Case, source: &CaseSource, ready: &Ready, reporter: &dyn Rep
         let (error, how) = if imported {
             (work.error_from_groups(&basis), "groups of panels")
         } else {
-            (work.error_from_coarser_mesh(&basis, fineness)?, "a coarser mesh")
+            (work.error_from_coarser_mesh(&basis, before.take(), fineness)?, "a coarser mesh")
         };
         if error <= case.field.accuracy || pinned || imported || round == ROUNDS {
             work.warn_if_missed(error, mesh.panels());
             return Ok(work.done(basis, error, how));
         }
-        // Errors fall with the square of the panel size; a little more than needed, since the estimate is one.
-        let mut finer = fineness * (1.2 * error / case.field.accuracy).sqrt().clamp(1.15, 2.5);
+        // Errors fall with the square of the panel size; more than needed, since the estimate is one and meshes come in steps.
+        let mut finer = fineness * (1.3 * error / case.field.accuracy).sqrt().clamp(1.15, 2.5);
         mesh = work.mesh(finer, 1.0)?;
         if mesh.panels() > case.field.max_panels {
             finer = work.electrodes.fineness_for(case, source, case.field.max_panels * 19 / 20)?;
@@ -86,6 +90,7 @@ pub fn solve(case: &Case, source: &CaseSource, ready: &Ready, reporter: &dyn Rep
             return Ok(work.done(basis, error, how));
         }
         fineness = finer;
+        before = Some(basis);
     }
     unreachable!("the last round returns")
 }
@@ -203,21 +208,32 @@ impl Work<'_> {
         if self.case.field.panels.is_some() { "field.panels" } else { "field" }
     }
 
-    /// Solves on a coarser mesh, and takes the errors of both to fall with the square of the panel size.
-    fn error_from_coarser_mesh(&mut self, basis: &ElectrodeBasis, fineness: f64) -> Result<f64, Failure> {
-        self.reporter.stage("error estimate");
-        let mesh = self.mesh(fineness / COARSER, 1.0 / (COARSER * COARSER))?;
-        let ratio = (basis.panels.len() as f64 / mesh.panels() as f64).sqrt();
-        if ratio < 1.1 {
-            // Shapes have least numbers of panels: nothing coarser can be made, and groups of panels stand in.
-            let fine = basis.mesh.clone();
-            let again = self.solve(&fine, true)?;
-            return Ok(self.error_from_groups(&again));
-        }
-        let coarse = self.solve(&mesh, false)?;
+    /// Compares with the solution on a coarser mesh, the one before if there is one, and takes the errors of both to fall
+    /// with the square of the panel size.
+    fn error_from_coarser_mesh(
+        &mut self,
+        basis: &ElectrodeBasis,
+        before: Option<ElectrodeBasis>,
+        fineness: f64,
+    ) -> Result<f64, Failure> {
+        let ratio = |coarse: usize| (basis.panels.len() as f64 / coarse as f64).sqrt();
+        let coarse = match before.filter(|before| ratio(before.panels.len()) > NEAREST) {
+            Some(before) => before,
+            None => {
+                self.reporter.stage("error estimate");
+                let mesh = self.mesh(fineness / COARSER, 1.0 / (COARSER * COARSER))?;
+                if ratio(mesh.panels()) < NEAREST {
+                    // Shapes have least numbers of panels: nothing coarser can be made, and groups of panels stand in.
+                    let fine = basis.mesh.clone();
+                    let again = self.solve(&fine, true)?;
+                    return Ok(self.error_from_groups(&again));
+                }
+                self.solve(&mesh, false)?
+            }
+        };
         let difference = matrix_difference(&basis.capacitance.matrix, &coarse.capacitance.matrix)
             .max(self.field_difference(basis, &coarse));
-        Ok(difference / (ratio * ratio - 1.0))
+        Ok(difference / (ratio(coarse.panels.len()).powi(2) - 1.0))
     }
 
     fn error_from_groups(&self, basis: &ElectrodeBasis) -> f64 {
@@ -276,7 +292,7 @@ fn matrix_difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     a.iter().flatten().zip(b.iter().flatten()).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max) / largest
 }
 
-/// Points spread over the trap region, clear of conductors: a twentieth of the box or more where there is room.
+/// Points spread over the trap region, clear of conductors: a tenth of the box where there is room for that.
 fn trap_points(case: &Case, basis: &ElectrodeBasis) -> Vec<Vec3> {
     let region = region::table_box(case, &basis.mesh);
     let field = basis.panel_sum();
@@ -284,9 +300,9 @@ fn trap_points(case: &Case, basis: &ElectrodeBasis) -> Vec<Vec3> {
     // The sequence of Roberts (2018) in three dimensions: even coverage, always the same.
     let g: f64 = 1.220_744_084_605_76;
     let step = Vec3::new(1.0 / g, 1.0 / (g * g), 1.0 / (g * g * g));
-    for clearance in [0.05, 0.02, 0.005] {
+    for clearance in [0.1, 0.05, 0.02, 0.005] {
         let reach = clearance * size.max();
-        let points: Vec<Vec3> = (1..600)
+        let points: Vec<Vec3> = (1..1000)
             .map(|k| (step * k as f64).map(f64::fract))
             .map(|part| region.min + part.component_mul(&size))
             .filter(|p| field.tree().nearest(p, reach).is_none() && field.inside(p).is_none())
