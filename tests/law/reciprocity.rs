@@ -26,7 +26,7 @@ fn reciprocity_error(basis: &ElectrodeBasis, points: &[Vec3]) -> f64 {
 fn law_induced_charge_is_minus_the_unit_potential() {
     let frame = [Vec3::x(), Vec3::y(), Vec3::z()];
     let mut collocation = Vec::new();
-    for panels in [200, 800] {
+    for panels in [150, 600] {
         let mesh = ring_disc_sphere(panels);
         // Half a metre away: the right-hand sides are by a rule of degree 5 on panels whose radius is below 0.16.
         let points = clear_points(&mesh, 1.6, 0.5, 12, 7);
@@ -51,7 +51,7 @@ fn law_induced_charge_is_minus_the_unit_potential() {
 #[test]
 fn law_capacitance_is_symmetric() {
     let mut errors = Vec::new();
-    for panels in [200, 800] {
+    for panels in [150, 600] {
         let mesh = ring_disc_sphere(panels);
         let solved = |testing| BoundaryProblem { testing, ..BoundaryProblem::new(&mesh) }.solve().unwrap().capacitance;
         let (galerkin, plain) = (solved(Testing::Galerkin), solved(Testing::Collocation));
