@@ -6,7 +6,7 @@ use meshes::{Shape, SurfaceMesh, Vec3, triangulate};
 
 #[test]
 fn order_of_the_field_in_the_trap_region() {
-    // 4 s on two cores, most of it for 5100 panels.
+    // 6 s on two cores, most of it for 5100 panels.
     // Ring and disc of the study, at the reference's points a fifth of the ring's radius and more from both.
     let case = reference_case("composite.json", "ring_and_plate_config1");
     let all: Vec<Vec<f64>> = case.inputs["points_rho_z"].as_array().unwrap().iter().map(numbers).collect();
