@@ -3,5 +3,6 @@
 mod capacitance;
 mod composite;
 mod panel_integrals;
+mod paul_trap;
 mod sphere_in_field;
 mod table;

@@ -1,3 +1,8 @@
-//! Laws: reciprocity, superposition, rotation, thread count.
+//! Laws: reciprocity, superposition, motion and scale of the whole, Gauss, energy, thread count.
 
+mod energy;
+mod gauss;
+mod motion;
+mod reciprocity;
+mod superposition;
 mod threads;
