@@ -263,7 +263,9 @@ impl Work<'_> {
 
     fn warn_if_missed(&self, error: f64, panels: usize) {
         let asked = self.case.field.accuracy;
-        if !(error <= 1.05 * asked) && self.case.field.panels.is_none() {
+        // An error that is no number has not met what was asked.
+        let met = error <= 1.05 * asked;
+        if !met && self.case.field.panels.is_none() {
             self.reporter.warning(&format!(
                 "the field has an estimated error of {error:.1e} with {panels} panels; {asked:.0e} was asked. Raise field.max_panels (now {}) to come nearer",
                 self.case.field.max_panels
