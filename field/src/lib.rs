@@ -32,5 +32,7 @@ pub use linear_operator::LinearOperator;
 pub use panel::Panel;
 pub use panel_sum::PanelSum;
 pub use source::{Source, SourceKind};
-pub use table::{Grid, PotentialTable, TableError, TableOptions, TableReport, TabulatedField, tabulate};
+pub use table::{
+    Grid, PotentialTable, TableError, TableOptions, TableReport, TabulatedField, tabulate, tabulate_around,
+};
 pub use waveform::{Waveform, WaveformPart};

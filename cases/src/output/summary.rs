@@ -388,10 +388,10 @@ pub fn metres(length: f64) -> String {
         l if l == 0.0 || l >= 0.1 => (1.0, "m"),
         l if l >= 1e-4 => (1e-3, "mm"),
         l if l >= 1e-7 => (1e-6, "um"),
-        _ => (1e-9, "nm"),
+        l if l >= 1e-10 => (1e-9, "nm"),
+        _ => return format!("{length:.1e} m"),
     };
-    let value = length / factor;
-    if value != 0.0 && value.abs() < 0.01 { format!("{value:.1e} {unit}") } else { format!("{value:.3} {unit}") }
+    format!("{:.3} {unit}", length / factor)
 }
 
 /// What `mesh` says of a mesh.
@@ -471,6 +471,6 @@ mod tests {
     #[test]
     fn lengths_for_people() {
         assert_eq!([metres(0.25), metres(0.012), metres(3e-6)], ["0.250 m", "12.000 mm", "3.000 um"]);
-        assert_eq!([metres(0.0), metres(2e-15)], ["0.000 m", "2.0e-6 nm"]);
+        assert_eq!([metres(0.0), metres(2e-15)], ["0.000 m", "2.0e-15 m"]);
     }
 }

@@ -15,7 +15,7 @@ use meshes::Vec3;
 
 pub use grid::Grid;
 pub use hermite::PER_NODE;
-pub use tabulate::{TableError, TableOptions, TableReport, tabulate};
+pub use tabulate::{TableError, TableOptions, TableReport, tabulate, tabulate_around};
 
 use crate::panel_sum::PanelSum;
 use crate::{BasisField, ElectrodeBasis, Samples};

@@ -53,7 +53,7 @@ pub struct TableReport {
     pub bytes: u64,
     /// Mean size of a cell, m.
     pub spacing: f64,
-    /// Fraction of the cells that are interpolated; the others are left to the exact sum.
+    /// Fraction of the cells outside of conductors that are interpolated; the others are left to the exact sum.
     pub tabulated_fraction: f64,
     /// Cells between a conductor and the nearest interpolated cell.
     pub layer: f64,
@@ -84,6 +84,19 @@ const THICKEST: f64 = 3.0;
 /// Cells along the longest side of the box to begin with.
 const FIRST_CELLS: f64 = 24.0;
 
+/// The clearance of a cell inside a conductor, where no table is needed.
+const INSIDE: f64 = -1.0;
+
+/// The layer, in cells, that is left to the exact sum at the usual accuracies.
+const USUAL_LAYER: f64 = 1.5;
+
+/// Fraction of the cells outside of conductors that are to be interpolated, as long as the table stays small. A point in one of
+/// the others costs as much as filling a node: a grid of twice as many nodes pays off with the first few thousand points.
+const WIDE: f64 = 0.85;
+
+/// Nodes times basis functions above which that is no longer asked for: some 20 MB, a second to fill.
+const WIDE_NODES: usize = 100_000;
+
 /// Points at which the error is measured, for each thickness of layer. The largest error of 400 points misses the largest of
 /// all by a factor of about two where the error falls steeply with distance from a conductor; the worst cells are the
 /// nearest ones, and those are drawn as often as all others together.
@@ -96,6 +109,24 @@ const POINTS: usize = 400;
 pub fn tabulate(
     basis: &ElectrodeBasis,
     options: &TableOptions,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<(PotentialTable, TableReport), TableError> {
+    tabulate_around(basis, options, &[], progress)
+}
+
+/// Points of interest that are to lie in interpolated cells, where the spacing is chosen: all but what is next to a conductor
+/// anyway.
+const COVERED: f64 = 0.9;
+
+/// As [`tabulate`], with a spacing so small that the table holds most points of interest (where grains start, say): a cell next
+/// to a conductor is left to the exact sum, which takes a hundred times as long.
+///
+/// # Errors
+/// As [`tabulate`].
+pub fn tabulate_around(
+    basis: &ElectrodeBasis,
+    options: &TableOptions,
+    interest: &[Vec3],
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<(PotentialTable, TableReport), TableError> {
     let functions = basis.functions();
@@ -120,6 +151,10 @@ pub fn tabulate(
         });
     }
     let exact = basis.panel_sum();
+    if options.spacing.is_none() {
+        let fits = |spacing: f64| bytes(spacing).1 <= options.max_bytes;
+        spacing = wide_spacing(options, spacing, functions, interest, exact.tree(), fits);
+    }
     loop {
         let grid = Grid::new(options.min, options.max, spacing);
         let clearance = clearances(&grid, exact.tree());
@@ -139,7 +174,8 @@ pub fn tabulate(
         report.spacing = grid.spacing().mean();
         report.layer = layer;
         let kept = table.tabulated.iter().filter(|t| **t).count();
-        report.tabulated_fraction = kept as f64 / grid.cell_count() as f64;
+        let free = clearance.iter().filter(|c| **c > INSIDE).count();
+        report.tabulated_fraction = kept as f64 / free.max(1) as f64;
         let good = report.error() <= options.accuracy && layer <= THICKEST;
         // The error of the field falls with the fifth power of the spacing; a fifth to two fifths less at a time.
         let wanted = (options.accuracy / report.error().max(f64::MIN_POSITIVE)).powf(0.2);
@@ -151,7 +187,35 @@ pub fn tabulate(
     }
 }
 
-/// Distance of each cell from the nearest conductor, in cells; zero where it cuts one or lies inside.
+/// A spacing at which most of the space between conductors, and most points of interest, are so far from conductors that they
+/// will be interpolated; not so small that the table becomes large for that alone.
+fn wide_spacing(
+    options: &TableOptions,
+    first: f64,
+    functions: usize,
+    interest: &[Vec3],
+    tree: &SurfaceTree,
+    fits: impl Fn(f64) -> bool,
+) -> f64 {
+    let mut spacing = first;
+    loop {
+        let grid = Grid::new(options.min, options.max, spacing);
+        let clearance = clearances(&grid, tree);
+        let free = clearance.iter().filter(|c| **c > INSIDE).count();
+        let kept = clearance.iter().filter(|c| **c >= USUAL_LAYER).count();
+        let in_box: Vec<usize> = interest.iter().filter_map(|p| grid.locate(p)).map(|(at, _)| grid.cell(at)).collect();
+        let held = in_box.iter().filter(|cell| clearance[**cell] >= USUAL_LAYER).count();
+        let wide = kept as f64 >= WIDE * free as f64 && held as f64 >= COVERED * in_box.len() as f64;
+        let next = 0.8 * spacing;
+        let large = Grid::new(options.min, options.max, next).nodes() * functions > WIDE_NODES;
+        if wide || large || !fits(next) {
+            return spacing;
+        }
+        spacing = next;
+    }
+}
+
+/// Distance of each cell from the nearest conductor, in cells; zero where it cuts one, [`INSIDE`] where it lies within.
 fn clearances(grid: &Grid, tree: &SurfaceTree) -> Vec<f64> {
     let spacing = grid.spacing();
     let (size, half) = (spacing.max(), 0.5 * spacing.norm());
@@ -163,7 +227,7 @@ fn clearances(grid: &Grid, tree: &SurfaceTree) -> Vec<f64> {
             match tree.nearest(&center, reach) {
                 Some(nearest) if nearest.distance <= half => 0.0,
                 // Nothing is cut: the whole cell is inside where its centre is.
-                _ if tree.inside(&center).is_some() => 0.0,
+                _ if tree.inside(&center).is_some() => INSIDE,
                 Some(nearest) => (nearest.distance - half) / size,
                 None => (reach - half) / size,
             }
