@@ -13,7 +13,7 @@ use crate::capacitance::CapacitanceMatrix;
 use crate::coarse::coarse_capacitance;
 use crate::constants::COULOMB;
 use crate::electrode_basis::ElectrodeBasis;
-use crate::influence::{Testing, potential_coefficients};
+use crate::influence::{Testing, potential_coefficients_telling};
 use crate::linear_operator::GalerkinOperator;
 use crate::panel::{Panel, quadrature};
 use crate::source::Source;
@@ -95,6 +95,9 @@ pub struct SolveReport {
     pub matrix_bytes: u64,
 }
 
+/// Share of the work that filling the matrix is, at some thousand panels.
+const ASSEMBLY: f64 = 0.8;
+
 impl<'a> BoundaryProblem<'a> {
     /// The problem of electrodes alone, with Galerkin testing.
     pub fn new(mesh: &'a SurfaceMesh) -> Self {
@@ -114,6 +117,15 @@ impl<'a> BoundaryProblem<'a> {
     /// # Errors
     /// See [`SolveError`].
     pub fn solve(&self) -> Result<ElectrodeBasis, SolveError> {
+        self.solve_telling(&|_| ())
+    }
+
+    /// As [`BoundaryProblem::solve`]; `progress` hears the fraction of the work that is done, as far as it can be told: it
+    /// stands still while the matrix is factorised.
+    ///
+    /// # Errors
+    /// See [`SolveError`].
+    pub fn solve_telling(&self, progress: &(dyn Fn(f64) + Sync)) -> Result<ElectrodeBasis, SolveError> {
         let mesh = self.mesh;
         let name = |panel: usize| mesh.electrodes[mesh.electrode[panel] as usize].name.clone();
         let panels: Vec<Panel> = (0..mesh.panels()).map(|p| Panel::new(mesh.corners(p))).collect();
@@ -125,7 +137,7 @@ impl<'a> BoundaryProblem<'a> {
         let start = Instant::now();
         let mut charge = self.right_hand_sides(&panels)?;
         let wanted = charge.clone();
-        let mut matrix = potential_coefficients(&panels, self.testing);
+        let mut matrix = potential_coefficients_telling(&panels, self.testing, &|done| progress(ASSEMBLY * done));
         let assembled = Instant::now();
         let coarse = (self.with_coarse && self.testing == Testing::Galerkin && !panels.is_empty())
             .then(|| coarse_capacitance(mesh, &panels, &matrix))

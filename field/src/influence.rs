@@ -7,6 +7,8 @@
 //! symmetric and positive definite, and capacitances from it are below the exact ones and converge twice as fast; the
 //! collocation matrix is the plain method and stays as the judge.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use faer::Mat;
 use meshes::Vec3;
 use rayon::prelude::*;
@@ -45,7 +47,13 @@ const TOUCHING: f64 = 0.25;
 
 /// The matrix of potential coefficients, 1/m. For Galerkin testing only the lower triangle is filled.
 pub fn potential_coefficients(panels: &[Panel], testing: Testing) -> Mat<f64> {
+    potential_coefficients_telling(panels, testing, &|_| ())
+}
+
+/// As [`potential_coefficients`]; `progress` hears the fraction of the entries that are done, from any thread.
+pub fn potential_coefficients_telling(panels: &[Panel], testing: Testing, progress: &(dyn Fn(f64) + Sync)) -> Mat<f64> {
     let n = panels.len();
+    let (done, all) = (AtomicUsize::new(0), (n * (n + 1) / 2) as f64);
     let mut matrix = Mat::<f64>::zeros(n, n);
     let columns: Vec<_> = matrix.col_iter_mut().enumerate().collect();
     columns.into_par_iter().for_each(|(j, mut column)| match testing {
@@ -53,11 +61,13 @@ pub fn potential_coefficients(panels: &[Panel], testing: Testing) -> Mat<f64> {
             for i in j..n {
                 column[i] = galerkin(&panels[i], &panels[j], i == j);
             }
+            progress((done.fetch_add(n - j, Ordering::Relaxed) + n - j) as f64 / all);
         }
         Testing::Collocation => {
             for i in 0..n {
                 column[i] = panels[j].potential(&panels[i].centroid) / panels[j].area;
             }
+            progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / n as f64);
         }
     });
     matrix

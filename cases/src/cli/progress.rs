@@ -43,6 +43,10 @@ impl Progress {
     }
 }
 
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> ")
+}
+
 impl Reporter for Progress {
     fn stage(&self, name: &str) {
         if !self.shown {
@@ -50,8 +54,8 @@ impl Reporter for Progress {
         }
         self.finish();
         let bar = ProgressBar::new(STEPS);
-        let style = ProgressStyle::with_template("  {prefix:20} [{bar:32}] {percent:>3} %  {elapsed} {msg}");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
+        // Until it is known how far the work is.
+        bar.set_style(style("  {prefix:20} {spinner} {elapsed}"));
         bar.set_prefix(name.to_owned());
         bar.enable_steady_tick(Duration::from_millis(200));
         let mut stage = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
@@ -63,6 +67,9 @@ impl Reporter for Progress {
             return;
         }
         if let Some((_, start, bar)) = &*self.stage.lock().unwrap_or_else(PoisonError::into_inner) {
+            if bar.position() == 0 {
+                bar.set_style(style("  {prefix:20} [{bar:32}] {percent:>3} %  {elapsed} {msg}"));
+            }
             bar.set_position((done.clamp(0.0, 1.0) * STEPS as f64) as u64);
             let left = start.elapsed().as_secs_f64() * (1.0 / done.max(1e-9) - 1.0);
             if done > 0.02 && left.is_finite() {

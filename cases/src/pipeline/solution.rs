@@ -156,7 +156,8 @@ impl Work<'_> {
             Method::Collocation => Testing::Collocation,
         };
         let problem = BoundaryProblem { mesh, sources: self.sources, testing, with_coarse };
-        let basis = problem.solve().map_err(|error| self.explained(error))?;
+        let told = problem.solve_telling(&|done| self.reporter.fraction(done));
+        let basis = told.map_err(|error| self.explained(error))?;
         self.solve_seconds += start.elapsed().as_secs_f64();
         Ok(basis)
     }
