@@ -63,7 +63,7 @@ if high > low:
     shown.ColorArrayName = [None, ""]
     shown.AmbientColor = shown.DiffuseColor = [0.35, 0.35, 0.4]
     shown.LineWidth = 1.2
-    shown.DisableLighting = 1
+    shown.Ambient, shown.Diffuse = 1.0, 0.0
 
 if os.path.exists(path("trajectories.vtp")):
     tracks = pv.XMLPolyDataReader(FileName=[path("trajectories.vtp")])
@@ -96,7 +96,7 @@ side = [0.55, 0.35, 0.55]
 direction = [across[k] * 1.6 + (side[k] if k != axis else 0.0) for k in range(3)]
 pv.ResetCamera(view)
 view.CameraFocalPoint = center
-view.CameraPosition = [center[k] + size * 1.55 * direction[k] for k in range(3)]
+view.CameraPosition = [center[k] + size * 1.3 * direction[k] for k in range(3)]
 view.CameraViewUp = [0.0, 0.0, 1.0] if normal != "z" else [0.0, 1.0, 0.0]
 pv.Render(view)
 pv.SaveScreenshot(picture, view, ImageResolution=[1200, 900])

@@ -23,6 +23,13 @@
 //! let error = source.error_at("electrode.left.radius", "the ring touches the plate", "make it smaller");
 //! assert!(error.report(Look::PLAIN).contains("case.toml:5:15"));
 //! ```
+//!
+//! # From a case to files
+//!
+//! [`pipeline`] has one file for each stage: a checked case ([`pipeline::ready`]), unit solutions to the accuracy asked
+//! ([`pipeline::solution`]), their table ([`pipeline::tables`]), the driven field ([`pipeline::drives`]) and the flights
+//! ([`pipeline::flights`]). [`output`] writes what came of them, [`plots`] draws, [`cache`] keeps solutions for the next run, and
+//! [`cli`] is the command.
 
 pub mod cache;
 pub mod case;

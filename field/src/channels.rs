@@ -31,7 +31,7 @@ impl Channels {
         elements.channels()
     }
 
-    /// As [`Channels::new`], with basis function `f` of `combinations[i] = (f, row)` at Σ_k row[k] times waveform k instead of
+    /// As [`Channels::new`], with basis function `f` of `combinations[i] = (f, row)` at `Σ_k row[k]` times waveform k instead of
     /// its own: floating electrodes, whose voltages follow from those of the others (`waveforms[f]` then holds its charge).
     pub fn with_floating(waveforms: &[Waveform], combinations: &[(usize, Vec<f64>)]) -> Self {
         let mut elements = Elements::default();

@@ -8,6 +8,31 @@
 //! * **electrode**: a named set of panels at one potential;
 //! * **sheet**: a surface of zero thickness, with free edges;
 //! * **closed**: without free edges, so that it has an inside.
+//!
+//! ```
+//! use meshes::{MeshReport, Placement, Shape, SurfaceMesh, Vec3, triangulate};
+//!
+//! // A hemisphere over a plate, each with the number of panels that shapes have at fineness 1.
+//! let cap = triangulate(&Shape::EndCap { radius: 0.1, opening: 90_f64.to_radians(), thickness: 0.0 }, 1.0)?;
+//! let plate = triangulate(&Shape::Plate { size: [0.3, 0.3], thickness: 0.0 }, 1.0)?;
+//! let at = |z: f64| Placement { center: Vec3::z() * z, axis: Vec3::z(), up: None };
+//! let mesh = SurfaceMesh::assemble([
+//!     ("cap".to_owned(), cap.placed(&at(0.05))?),
+//!     ("plate".to_owned(), plate.placed(&at(0.0))?),
+//! ]);
+//!
+//! // The true area, whatever the number of panels; free edges, since both are sheets; how far they are apart.
+//! let report = MeshReport::new(&mesh);
+//! let area = 2.0 * std::f64::consts::PI * 0.1 * 0.1;
+//! assert!((report.electrodes[0].area / area - 1.0).abs() < 1e-9);
+//! assert!(report.electrodes[1].open_edges > 0);
+//! println!("{report}");
+//!
+//! // For viewers.
+//! let mut file = Vec::new();
+//! meshes::vtk::write_surface(&mut file, &mesh, &[], &[])?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod import;
 pub mod lattice;
