@@ -61,6 +61,10 @@ pub(super) fn run(session: &Session, reuse: bool) -> Result<(), Failure> {
         summary.seconds.trace = Some(flights.seconds);
         writing += start.elapsed().as_secs_f64();
     }
+    if summary.trace.is_none() {
+        summary.trace = Some(TraceSummary::none(&flight_region(case, &solution.basis.mesh)));
+        summary.seconds.trace = Some(0.0);
+    }
     summary.seconds.write = writing;
     session.finish(out, summary)
 }

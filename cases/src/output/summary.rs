@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use meshes::{MeshReport, SurfaceMesh};
 use serde::Serialize;
-use tracer::{Ensemble, Outcome};
+use tracer::{Ensemble, Outcome, Region};
 
 use crate::case::{Case, Drive};
 use crate::pipeline::flights::Flights;
@@ -227,6 +227,23 @@ impl TableSummary {
 }
 
 impl TraceSummary {
+    /// Of a case without grains.
+    pub fn none(region: &Region) -> Self {
+        Self {
+            grains: 0,
+            steps: 0,
+            rejected_steps: 0,
+            integrator: "none",
+            outcomes: Outcomes::default(),
+            position_error_estimate: None,
+            finals: Some(Vec::new()),
+            every: 0.0,
+            stride: 1,
+            region_min: region.min.into(),
+            region_max: region.max.into(),
+        }
+    }
+
     /// Of flights.
     pub fn new(case: &Case, flights: &Flights) -> Self {
         let traced = &flights.traced;
@@ -307,7 +324,7 @@ impl Summary {
                 ),
             );
         }
-        if let Some(trace) = &self.trace {
+        if let Some(trace) = self.trace.as_ref().filter(|trace| trace.grains > 0) {
             let o = &trace.outcomes;
             let mut parts = Vec::new();
             if o.time_up > 0 {
@@ -405,7 +422,7 @@ pub struct MeshSummary {
     pub electrodes: Vec<ElectrodeMesh>,
 }
 
-/// What `mesh` says of one electrode.
+/// What `mesh` says of one electrode: [`meshes::ElectrodeReport`] as an object, since `meshes` writes no JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct ElectrodeMesh {
     /// Name.
