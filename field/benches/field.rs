@@ -136,11 +136,22 @@ fn one_panel_in_closed_form(bencher: Bencher) {
     bencher.counter(ItemsCount::new(1_u32)).bench(|| divan::black_box(&panel).potential_and_gradient(&x));
 }
 
-/// Both channels at points of the exact sum over 2000 panels, on one thread. Items: points.
-#[divan::bench]
-fn points_of_the_exact_sum(bencher: Bencher) {
-    let field = BASIS.panel_sum();
+/// Both channels at points of the exact sum over 1920 and 3584 panels, on one thread. Items: points.
+#[divan::bench(args = [1000, 1800])]
+fn points_of_the_exact_sum(bencher: Bencher, each: usize) {
+    let field = BoundaryProblem::new(&rings(each)).solve().expect("sound rings").panel_sum();
     sample(bencher, &field, &points(50));
+}
+
+/// The same, a wire radius off the wires. Items: points.
+#[divan::bench(args = [1000, 1800])]
+fn points_of_the_exact_sum_beside_wires(bencher: Bencher, each: usize) {
+    let field = BoundaryProblem::new(&rings(each)).solve().expect("sound rings").panel_sum();
+    let beside = |k: usize| {
+        let (sin, cos) = (k as f64).sin_cos();
+        Vec3::new(1.1 * cos, 1.1 * sin, if k.is_multiple_of(2) { 1.0 } else { -1.0 })
+    };
+    sample(bencher, &field, &(0..50).map(beside).collect::<Vec<_>>());
 }
 
 /// Both channels at points of the table, on one thread. Items: points.
@@ -151,8 +162,11 @@ fn points_of_the_table(bencher: Bencher) {
 }
 
 fn sample(bencher: Bencher, field: &dyn BasisField, points: &[Vec3]) {
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let mut samples = Samples::default();
-    bencher.counter(ItemsCount::new(points.len())).bench_local(|| field.sample(points, &mut samples));
+    bencher
+        .counter(ItemsCount::new(points.len()))
+        .bench_local(|| one_thread.install(|| field.sample(points, &mut samples)));
 }
 
 /// Filling a table and measuring its error. Items: nodes, each with 27 derivatives of both channels.

@@ -65,6 +65,7 @@ pub mod harmonics;
 pub mod influence;
 pub mod linear_operator;
 pub mod panel;
+mod panel_groups;
 pub mod panel_sum;
 pub mod source;
 pub mod table;

@@ -71,9 +71,9 @@ fn law_flux_is_the_enclosed_charge() {
         for (function, (flux, _)) in flux.into_iter().enumerate() {
             let induced: f64 = inside.iter().map(|&e| charge(e, function)).sum();
             let enclosed = induced + f64::from(u8::from(source && function == 3));
-            // Against all charge there is, since the flux of what is outside must cancel. Panels in closed form and the points
-            // that far ones act through obey Gauss's law each; on the sphere a panel changes from one to the other, by 1e-7 of
-            // its share at most. The rule of 60 leaves less than 1e-9 at a fifth of the radius. Measured 4e-10.
+            // Against all charge there is, since the flux of what is outside must cancel. Panels in closed form and the
+            // moments that far ones act through obey Gauss's law each; on the sphere a panel changes from one to the other, by
+            // 6e-8 of its share at most. The rule of 60 leaves less than 1e-9 at a fifth of the radius. Measured 2e-10.
             let scale: f64 =
                 (0..3).map(|e| charge(e, function).abs()).sum::<f64>() + f64::from(u8::from(function == 3));
             let error = (flux * permittivity - enclosed) / scale;
@@ -98,7 +98,7 @@ fn law_mean_on_a_sphere_is_the_value_at_its_centre() {
         for (function, (_, mean)) in on_sphere(&field, center, radius, 20).into_iter().enumerate() {
             let error = mean - samples.potential[function];
             println!("function {function}: {error:9.1e} V");
-            // The rule that far panels act through, 1e-7 of the share of a few, at the centre and on the sphere. Measured 6e-11.
+            // The moments that far panels act through, 6e-8 of their share, at the centre and on the sphere. Measured 3e-11.
             assert!(error.abs() < 2e-9, "{error:e}");
         }
     }
