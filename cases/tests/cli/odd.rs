@@ -1,0 +1,1 @@
+//! Odd cases that are not wrong, and what is done with them.
