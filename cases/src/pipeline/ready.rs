@@ -43,7 +43,25 @@ pub fn ready(case: &Case, source: &CaseSource, reporter: &dyn Reporter) -> Resul
     };
     let bounds = flight_region(case, &mesh);
     check_starts(case, source, &ensemble, &tree, &sources, &bounds)?;
+    check_apart(case, source, &ensemble)?;
     Ok(Ready { electrodes, mesh, sources, ensemble })
+}
+
+/// Refuses grains that repel each other and start in one place: the force between them has no direction and no end.
+fn check_apart(case: &Case, source: &CaseSource, ensemble: &Ensemble) -> Result<(), Failure> {
+    if !case.forces.coulomb {
+        return Ok(());
+    }
+    let at = |grain: usize| -> [f64; 3] { ensemble.positions()[grain].into() };
+    let mut order: Vec<usize> = (0..ensemble.len()).collect();
+    let compare = |a: &usize, b: &usize| at(*a).partial_cmp(&at(*b)).unwrap_or(std::cmp::Ordering::Equal);
+    order.sort_by(compare);
+    let Some(pair) = order.windows(2).find(|pair| at(pair[0]) == at(pair[1])) else { return Ok(()) };
+    let (group, [x, y, z]) = (&case.grains[ensemble.groups()[pair[1]] as usize].name, at(pair[0]));
+    let problem =
+        format!("two grains start in one place, ({x:.4}, {y:.4}, {z:.4}) m, and repel each other without end");
+    let help = "move them apart, or leave out `coulomb`";
+    Err(source.error_at(&format!("grains.{group}.place"), problem, help).into())
 }
 
 /// The region in which grains are followed.
