@@ -1,36 +1,17 @@
 //! The case files in `tests/cli`: good ones are read, bad ones give the message that stands in them.
 
+mod common;
+
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use cases::{Case, CaseError, Look};
-
-/// The case files of one folder, in order.
-fn files(folder: &str) -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/cli").join(folder);
-    let entries = fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
-    let mut files: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
-    files.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
-    files.sort();
-    files
-}
-
-/// The values of lines such as `#! expect: ...`.
-fn directives(text: &str, name: &str) -> Vec<String> {
-    let head = format!("#! {name}:");
-    text.lines().filter_map(|line| line.strip_prefix(&head)).map(|rest| rest.trim().to_owned()).collect()
-}
+use common::{directives, files, flat};
 
 /// Reads a file as the command would, with the `--set` arguments it names itself. Messages call it `case.toml`.
 fn read(path: &Path) -> Result<Case, CaseError> {
     let text = fs::read_to_string(path).unwrap();
     Case::parse(path.with_file_name("case.toml"), &text, &directives(&text, "set")).map(|(case, _)| case)
-}
-
-/// One line without the drawing, so that wrapped sentences are found.
-fn flat(report: &str) -> String {
-    let drawing = |word: &&str| !word.chars().all(|c| "|`,-.'^x:".contains(c)) || *word == "x";
-    report.split_whitespace().filter(drawing).collect::<Vec<_>>().join(" ")
 }
 
 #[test]

@@ -130,6 +130,7 @@ impl Options {
 
     /// How many samples a flight of full length has.
     pub(crate) fn samples(&self) -> usize {
-        self.every.map_or(0, |every| (self.duration / every).floor() as usize + 2)
+        // Too many for a count are too many for anything else.
+        self.every.map_or(0, |every| ((self.duration / every).floor() as usize).saturating_add(2))
     }
 }

@@ -9,9 +9,9 @@ use crate::pipeline::Failure;
 /// names it waits: either all of them do or none.
 pub(super) fn clean_up_in(folder: PathBuf) -> Result<(), Failure> {
     let handler = move || {
-        let _undisturbed = undisturbed();
+        let committed = undisturbed();
         remove_all_partial(&folder);
-        eprintln!("\nstopped: no file was written");
+        eprintln!("\nstopped: {}", if *committed { "all files were written" } else { "no file was written" });
         std::process::exit(1);
     };
     ctrlc::set_handler(handler)

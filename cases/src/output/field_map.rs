@@ -120,7 +120,7 @@ impl FieldMap {
     ///
     /// q charge, m mass, ω each angular frequency, E_ω the complex field amplitude at it. Valid while the grain moves little
     /// over one period compared with the length on which E_ω varies (Dehmelt 1967). `None` where nothing oscillates, or
-    /// something does otherwise than as a sine.
+    /// something does otherwise than as a sine, or so strongly that the energy is beyond any number.
     fn pseudopotential(&self, field: &DrivenField, charge: f64, mass: f64) -> Option<Vec<f64>> {
         // (frequency, for each channel its cosine and sine amplitude)
         let mut tones: Vec<(f64, Vec<(f64, f64)>)> = Vec::new();
@@ -153,7 +153,8 @@ impl FieldMap {
                 })
                 .sum()
         };
-        Some((0..self.conductor.len()).map(at).collect())
+        let energies: Vec<f64> = (0..self.conductor.len()).map(at).collect();
+        energies.iter().all(|energy| energy.is_finite()).then_some(energies)
     }
 }
 

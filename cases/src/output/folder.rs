@@ -83,7 +83,11 @@ impl OutputFolder {
         if let Some(folder) = temporary.parent() {
             fs::create_dir_all(folder).map_err(|error| failed(plain(&error)))?;
         }
-        let file = File::create(&temporary).map_err(|error| failed(plain(&error)))?;
+        // Not while an interrupt clears the folder: it would miss the new file.
+        let file = {
+            let _undisturbed = undisturbed();
+            File::create(&temporary).map_err(|error| failed(plain(&error)))?
+        };
         let mut out = BufWriter::with_capacity(1 << 18, file);
         content(&mut out).map_err(|error| failed(error.to_string()))?;
         out.flush().map_err(|error| failed(plain(&error)))?;
@@ -94,21 +98,24 @@ impl OutputFolder {
     /// Gives every file its own name. Files of an earlier run in `grains/` that this one did not write go away.
     ///
     /// # Errors
-    /// A file cannot be renamed.
+    /// A file cannot be renamed. Where a folder has the name of a file, which is the likely reason, no file is.
     pub fn commit(mut self) -> Result<Vec<PathBuf>, Failure> {
-        let _undisturbed = undisturbed();
+        let mut committed = undisturbed();
+        let failed = |path: &Path, reason: String| {
+            let help = "is it open in another program, or is there a folder of that name?";
+            Failure::run(format!("{} cannot be written: {reason}", path.display()), help)
+        };
+        if let Some(path) = self.written.iter().map(|name| self.path.join(name)).find(|path| path.is_dir()) {
+            return Err(failed(&path, "a folder has that name".to_owned()));
+        }
         let mut paths = Vec::with_capacity(self.written.len());
         for name in std::mem::take(&mut self.written) {
             let path = self.path.join(&name);
-            fs::rename(self.temporary(&name), &path).map_err(|error| {
-                Failure::run(
-                    format!("{} cannot be written: {}", path.display(), plain(&error)),
-                    "is it open in another program, or is there a folder of that name?",
-                )
-            })?;
+            fs::rename(self.temporary(&name), &path).map_err(|error| failed(&path, plain(&error)))?;
             paths.push(path);
         }
         self.remove_old_frames(&paths);
+        *committed = true;
         Ok(paths)
     }
 
@@ -132,10 +139,11 @@ impl OutputFolder {
     }
 }
 
-static COMMIT: Mutex<()> = Mutex::new(());
+static COMMIT: Mutex<bool> = Mutex::new(false);
 
-/// Held while files get their names. Whoever means to end the process takes it first.
-pub fn undisturbed() -> MutexGuard<'static, ()> {
+/// Held while files are begun and while they get their names; whether they have got them. Whoever means to end the process
+/// takes it first.
+pub fn undisturbed() -> MutexGuard<'static, bool> {
     COMMIT.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

@@ -42,11 +42,66 @@ const MOST_SAMPLES: f64 = 4000.0;
 /// some thousand steps (measured: 1e-8 after a hundred RF periods at 1e-9).
 const STEP_SHARE: f64 = 1e-3;
 
+/// Samples of one grain beyond which none can be kept, and taking them takes minutes.
+const MOST_SAMPLES_OF_A_GRAIN: f64 = 1e8;
+
+/// Periods or steps of one flight from which on a person is told that it takes long: a minute at a few million steps a second
+/// for the simplest forces.
+const MANY_STEPS: f64 = 1e7;
+
+/// Steps beyond which each is lost in the rounding of the time.
+const MOST_STEPS: f64 = 1e15;
+
+/// Bytes that a grain takes while it is traced: its state, its coefficients between steps, its ending, its first and last
+/// sample.
+const BYTES_OF_A_GRAIN: u64 = 1000;
+
+/// Refuses more grains than fit in memory, and times between samples or steps that no run comes to the end of.
+///
+/// # Errors
+/// Names the key that asks for so much.
+fn check_amounts(case: &Case, settings: &TraceSettings, source: &CaseSource) -> Result<(), Failure> {
+    let count = case.grains.iter().fold(0_u64, |sum, group| sum.saturating_add(group.count as u64));
+    let (needed, free) = (count.saturating_mul(BYTES_OF_A_GRAIN), memory::available());
+    if let Some(largest) = case.grains.iter().max_by_key(|group| group.count).filter(|_| needed > free) {
+        let (needed, free) = (memory::people(needed), memory::people(free));
+        let problem = format!("{count} grains need some {needed} of memory, and {free} are free");
+        return Err(source.error_at(&format!("grains.{}.count", largest.name), problem, "trace fewer grains").into());
+    }
+    if let Some(every) = case.output.every.filter(|every| settings.duration / every > MOST_SAMPLES_OF_A_GRAIN) {
+        let samples = settings.duration / every;
+        let problem = format!("{samples:.0e} samples of each grain are more than can be kept");
+        let help = format!("sample every {:.0e} s or more, or trace for a shorter time", settings.duration / 1e6);
+        return Err(source.error_at("output.every", problem, help).into());
+    }
+    if let Some(step) = settings.step.filter(|step| settings.duration / step > MOST_STEPS) {
+        let problem =
+            format!("{:.0e} steps in the duration: each is lost in the rounding of the time", settings.duration / step);
+        return Err(source.error_at("trace.step", problem, "take longer steps, or leave out `step`").into());
+    }
+    Ok(())
+}
+
+/// Tells when a flight has so many steps that it takes long.
+fn warn_of_long_flights(settings: &TraceSettings, field: &DrivenField, reporter: &dyn Reporter) {
+    let periods = field.shortest_period().map_or(0.0, |period| settings.duration / period);
+    if periods > MANY_STEPS {
+        reporter.warning(&format!(
+            "the duration holds {periods:.0e} periods of the fastest voltage, with ten steps and more in each: this takes long. Is trace.duration meant, and the frequency?"
+        ));
+    }
+    let steps = settings.step.map_or(0.0, |step| settings.duration / step);
+    if steps > MANY_STEPS {
+        reporter.warning(&format!("{steps:.0e} steps of each grain take long. Is trace.step meant?"));
+    }
+}
+
 /// Draws the grains of a case.
 ///
 /// # Errors
-/// A group that cannot be drawn.
+/// A group that cannot be drawn, more grains or samples than can be.
 pub fn ensemble(case: &Case, settings: &TraceSettings, source: &CaseSource) -> Result<Ensemble, Failure> {
+    check_amounts(case, settings, source)?;
     let mut ensemble = Ensemble::new();
     for (number, group) in case.grains.iter().enumerate() {
         let drawn = Group {
@@ -151,6 +206,7 @@ pub fn fly(
     reporter.stage("trace");
     let start = Instant::now();
     let every = sampling(case, settings, &field);
+    warn_of_long_flights(settings, &field, &**reporter);
     let system = system(case, field, surface, region);
     let listener = Arc::clone(reporter);
     let options = Options {
@@ -183,6 +239,12 @@ pub fn fly(
         ));
     }
     let samples = observer.into_samples();
+    if let Some(grain) = samples.iter().position(Vec::is_empty) {
+        let group = &case.grains[ensemble.groups()[grain] as usize].name;
+        let problem = format!("grain {grain} cannot start: the force on it is beyond any number");
+        let help = "look for a charge, a voltage or a mass that is off by many powers of ten";
+        return Err(source.error_at(&format!("grains.{group}"), problem, help).into());
+    }
     Ok(Flights { traced, samples, stride, every, region, seconds: start.elapsed().as_secs_f64() })
 }
 

@@ -7,7 +7,7 @@ use tracer::{Ensemble, Region};
 use super::surface::{Electrodes, check_contacts};
 use super::{Failure, Reporter, drives, flights, memory, region};
 use crate::CaseSource;
-use crate::case::Case;
+use crate::case::{Case, SourceKind};
 
 /// What a run starts from.
 #[derive(Clone, Debug)]
@@ -35,13 +35,33 @@ pub fn ready(case: &Case, source: &CaseSource, reporter: &dyn Reporter) -> Resul
     check_contacts(&mesh, case, source, reporter)?;
     electrodes.emphasise_gaps(case, &mesh, reporter);
     check_table(case, source, &mesh, &sources)?;
+    let tree = SurfaceTree::new(&mesh);
+    check_sources(case, source, &tree)?;
     let ensemble = match &case.trace {
         Some(settings) => flights::ensemble(case, settings, source)?,
         None => Ensemble::new(),
     };
     let bounds = flight_region(case, &mesh);
-    check_starts(case, source, &ensemble, &SurfaceTree::new(&mesh), &sources, &bounds)?;
+    check_starts(case, source, &ensemble, &tree, &sources, &bounds)?;
+    check_apart(case, source, &ensemble)?;
     Ok(Ready { electrodes, mesh, sources, ensemble })
+}
+
+/// Refuses grains that repel each other and start in one place: the force between them has no direction and no end.
+fn check_apart(case: &Case, source: &CaseSource, ensemble: &Ensemble) -> Result<(), Failure> {
+    if !case.forces.coulomb {
+        return Ok(());
+    }
+    let at = |grain: usize| -> [f64; 3] { ensemble.positions()[grain].into() };
+    let mut order: Vec<usize> = (0..ensemble.len()).collect();
+    let compare = |a: &usize, b: &usize| at(*a).partial_cmp(&at(*b)).unwrap_or(std::cmp::Ordering::Equal);
+    order.sort_by(compare);
+    let Some(pair) = order.windows(2).find(|pair| at(pair[0]) == at(pair[1])) else { return Ok(()) };
+    let (group, [x, y, z]) = (&case.grains[ensemble.groups()[pair[1]] as usize].name, at(pair[0]));
+    let problem =
+        format!("two grains start in one place, ({x:.4}, {y:.4}, {z:.4}) m, and repel each other without end");
+    let help = "move them apart, or leave out `coulomb`";
+    Err(source.error_at(&format!("grains.{group}.place"), problem, help).into())
 }
 
 /// The region in which grains are followed.
@@ -79,6 +99,18 @@ pub fn table_memory(case: &Case) -> u64 {
     }
 }
 
+/// Refuses point charges in metal: there is no field for them to make.
+fn check_sources(case: &Case, source: &CaseSource, tree: &SurfaceTree) -> Result<(), Failure> {
+    for point in case.sources.iter().filter(|s| matches!(s.kind, SourceKind::Point)) {
+        if let Some(electrode) = tree.inside(&point.placement.center) {
+            let problem = format!("it lies inside the conductor `{}`", case.electrodes[electrode].name);
+            let help = "move it; if the electrode is a chamber around it, give that hollow = true";
+            return Err(source.error_at(&format!("source.{}.center", point.name), problem, help).into());
+        }
+    }
+    Ok(())
+}
+
 /// Refuses a table whose spacing is given and that cannot fit.
 fn check_table(case: &Case, source: &CaseSource, mesh: &SurfaceMesh, sources: &[Source]) -> Result<(), Failure> {
     let Some(spacing) = case.table.spacing else { return Ok(()) };
@@ -111,8 +143,10 @@ pub(super) fn table_too_large(
     fits: f64,
 ) -> Failure {
     let key = if case.table.spacing.is_some() { "table.spacing" } else { "table.max_memory" };
+    // Beyond a thousand millions nobody reads digits, and the largest count is not exact.
+    let count = if nodes < 1_000_000_000 { nodes.to_string() } else { format!("{:.0e}", nodes as f64) };
     let problem = format!(
-        "a table of {nodes} nodes for {functions} electrodes and sources needs {} of memory, and {} may be used",
+        "a table of {count} nodes for {functions} electrodes and sources needs {} of memory, and {} may be used",
         memory::people(needed),
         memory::people(available)
     );

@@ -188,7 +188,7 @@ impl Work<'_> {
         if needed > free {
             let (needed, free) = (memory::people(needed), memory::people(free));
             let problem = format!("{panels} panels need {needed} of memory for their matrix, and {free} are free");
-            return Err(self.source.error_at(self.size_key(), problem, help).into());
+            return Err(self.source.error_at(&self.size_key(), problem, help).into());
         }
         // What the case asks for panel by panel is not bounded by the default.
         let largest = self.case.electrodes.iter().filter_map(|e| e.panels).sum::<usize>() * 13 / 10;
@@ -199,14 +199,19 @@ impl Work<'_> {
                 settings.max_panels
             );
             let help = format!("raise field.max_panels if the machine is large enough, or {help}");
-            return Err(self.source.error_at(self.size_key(), problem, help).into());
+            return Err(self.source.error_at(&self.size_key(), problem, help).into());
         }
         Ok(())
     }
 
     /// The key that decides how many panels there are.
-    fn size_key(&self) -> &'static str {
-        if self.case.field.panels.is_some() { "field.panels" } else { "field" }
+    fn size_key(&self) -> String {
+        let most = self.case.electrodes.iter().filter(|e| e.panels.is_some()).max_by_key(|e| e.panels);
+        match most {
+            Some(electrode) => format!("electrode.{}.panels", electrode.name),
+            None if self.case.field.panels.is_some() => "field.panels".to_owned(),
+            None => "field".to_owned(),
+        }
     }
 
     /// Compares with the solution on a coarser mesh, the one before if there is one, and takes the errors of both to fall

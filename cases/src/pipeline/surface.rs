@@ -219,8 +219,10 @@ pub fn check_contacts(
                 ));
                 continue;
             }
-            let problem =
-                format!("`{}` touches or cuts `{}` {place}, and they have different voltages", b.name, a.name);
+            let floats = [a, b].iter().any(|e| matches!(e.drive, Drive::Charge(_)));
+            let why =
+                if floats { "one of them floats at a voltage of its own" } else { "they have different voltages" };
+            let problem = format!("`{}` touches or cuts `{}` {place}, and {why}", b.name, a.name);
             let help = "move them apart, make one smaller, or give both the same `dc` and `rf`";
             // At what moves the electrode, if it is written.
             return Err(source.error_at(&format!("electrode.{}.center", b.name), problem, help).into());

@@ -1,0 +1,14 @@
+//! The command itself, as a user starts it: what it says, what it writes, and what it leaves when something goes wrong.
+//!
+//! The whole suite takes about a minute on two cores; nearly all of that are the shipped cases in `golden`.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod bad_run;
+mod golden;
+mod harness;
+mod json;
+mod odd;
+mod same;
+mod stopped;
