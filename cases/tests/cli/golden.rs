@@ -1,7 +1,7 @@
 //! The shipped cases, `cases/*/case.toml`: each gives the number that its comments promise.
 //!
 //! They run with fewer panels than by themselves where the promise allows it, and with few nodes in the file for viewers:
-//! two thirds of a minute together on two cores, several minutes otherwise.
+//! half a minute together on two busy cores, about four times that otherwise.
 
 use std::fs;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! The command itself, as a user starts it: what it says, what it writes, and what it leaves when something goes wrong.
 //!
-//! The whole suite takes about a minute on two cores; nearly all of that are the shipped cases in `golden`.
+//! The whole suite takes one to two minutes on two cores; a third of that are the shipped cases in `golden`.
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -3,6 +3,8 @@
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::Stdio;
+use std::sync::mpsc::channel;
+use std::time::Duration;
 
 use crate::harness::{Scratch, command, contents, graintrap, graintrap_in, is_whole};
 
@@ -105,9 +107,11 @@ fn cli_a_run_that_takes_days_says_so() {
     let long = TRAP.replace("50 Hz", "1 GHz").replace("10 ms", "1 s");
     let (case, out) = (scratch.file("long.toml", &long), scratch.at("out"));
     let mut run = command(&scratch.0, &["run", &case, "-o", &out]).stderr(Stdio::piped()).spawn().unwrap();
-    let first = BufReader::new(run.stderr.take().unwrap()).lines().next();
+    let (stderr, (tell, told)) = (run.stderr.take().unwrap(), channel());
+    std::thread::spawn(move || tell.send(BufReader::new(stderr).lines().next()));
+    let first = told.recv_timeout(Duration::from_secs(60));
     run.kill().unwrap();
     run.wait().unwrap();
-    let words = first.unwrap().unwrap();
+    let words = first.expect("nothing is said in a minute").unwrap().unwrap();
     assert!(words.starts_with("warning: the duration holds 1e9 periods of the fastest voltage"), "{words}");
 }
