@@ -57,7 +57,14 @@ pub(super) fn run(session: &Session, reuse: bool) -> Result<(), Failure> {
         let start = Instant::now();
         tracks::write(&mut out, &flights, &ready.ensemble)?;
         pictures::of_flights(&mut out, &session.title(), &flights)?;
-        summary.trace = Some(TraceSummary::new(case, &flights));
+        let trace = TraceSummary::new(case, &flights);
+        if trace.outcomes.unstable > 0 {
+            session.progress.warning(&format!(
+                "{} of {} grains were given up: the force on them, or their motion, was no longer finite. Look at their mass and charge, and at the voltages",
+                trace.outcomes.unstable, trace.grains
+            ));
+        }
+        summary.trace = Some(trace);
         summary.seconds.trace = Some(flights.seconds);
         writing += start.elapsed().as_secs_f64();
     }
