@@ -110,12 +110,13 @@ fn exact_composite_geometries() {
             }
             let a2 = axial_multipole(&field, center, 2, 0.1);
             let exact_a2 = numbers(&excitation["A_l"])[2];
-            println!(
-                "  V {volts:?}: potential {:.1e} V, field {:.1e}, A2 {:.1e}",
-                worst.0,
-                worst.1,
-                a2 / exact_a2 - 1.0
-            );
+            // In place of a ratio the coefficient itself where symmetry makes it zero.
+            let a2_error = if exact_a2.abs() > 1e-9 {
+                format!("A2 {:.1e}", a2 / exact_a2 - 1.0)
+            } else {
+                format!("A2 {a2:.1e} V/m² instead of 0")
+            };
+            println!("  V {volts:?}: potential {:.1e} V, field {:.1e}, {a2_error}", worst.0, worst.1);
             let most = volts.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
             assert!(worst.0 < 1e-3 * most, "{}: potentials miss by {} of {most} V", case.id, worst.0);
             assert!(worst.1 < 5e-3, "{}: fields miss by {} of the strongest", case.id, worst.1);

@@ -120,7 +120,7 @@ pub fn triangulate(shape: &Shape, fineness: f64) -> Result<Triangulation, ShapeE
         Shape::Wire { points, wire_radius } => tube::wire(points, *wire_radius, fineness),
         Shape::Box { size } => flat::block(*size, fineness),
         Shape::HyperbolicRing { r0, extent, .. } => round::hyperbolic_ring(*r0, *extent, fineness),
-        Shape::HyperbolicCap { z0, extent, .. } => round::hyperbolic_cap(*z0, *extent, fineness),
+        Shape::HyperbolicCap { r0, z0, extent } => round::hyperbolic_cap(*r0, *z0, *extent, fineness),
         Shape::Mesh { vertices, triangles } => {
             Triangulation { vertices: vertices.clone(), triangles: triangles.clone() }
         }
