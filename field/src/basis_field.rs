@@ -30,7 +30,7 @@ pub trait BasisField: Send + Sync {
 
     /// Potential and gradient of every channel at every point (m), into `samples`, whatever it held before.
     ///
-    /// Whoever calls splits the work between threads; an implementation runs on the calling thread only, and its answer
-    /// for a point does not depend on the other points of the batch.
+    /// Whoever calls may split the work between threads, and so may an implementation whose points are dear: its answer for a
+    /// point does not depend on the other points of the batch.
     fn sample(&self, points: &[Vec3], samples: &mut Samples);
 }

@@ -283,7 +283,7 @@ impl Shape {
                 Err(ShapeError::new(
                     "extent",
                     format!("is {extent} m, but the ring begins at r0 = {r0} m from the axis"),
-                    "make it larger than r0; three times r0 is usual",
+                    "make it larger than r0; two to three times r0 is usual",
                 ))
             }
             Self::Mesh { vertices, triangles } => {
