@@ -41,7 +41,7 @@ const COARSER: f64 = 1.5;
 const NEAREST: f64 = 1.1;
 
 /// Largest number of solutions on the way to the accuracy.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 5;
 
 /// Solves a case. Panels that the case pins come before its accuracy.
 ///
