@@ -32,7 +32,6 @@ fn geometries() -> Vec<Geometry> {
 }
 
 #[test]
-#[cfg_attr(not(feature = "long"), ignore = "20 s: run with --features long")]
 fn exact_table_at_a_64th_of_the_region() {
     for Geometry { name, mesh, half } in geometries() {
         let basis = BoundaryProblem::new(&mesh).solve().unwrap();
