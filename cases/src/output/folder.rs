@@ -1,5 +1,6 @@
 //! Files that appear under their final names only when they are whole.
 
+use std::collections::HashSet;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -121,6 +122,7 @@ impl OutputFolder {
 
     /// Removes animation frames (files we name) that no longer belong to the run.
     fn remove_old_frames(&self, current: &[PathBuf]) {
+        let current: HashSet<&PathBuf> = current.iter().collect();
         let Ok(entries) = fs::read_dir(self.path.join("grains")) else { return };
         for entry in entries.flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
