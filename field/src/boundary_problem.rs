@@ -95,7 +95,7 @@ pub struct SolveReport {
     pub matrix_bytes: u64,
 }
 
-/// Share of the work that filling the matrix is, at some thousand panels.
+/// Share of the progress bar that filling the matrix takes: a guess, on which nothing but the bar depends.
 const ASSEMBLY: f64 = 0.8;
 
 impl<'a> BoundaryProblem<'a> {

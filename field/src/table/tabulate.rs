@@ -91,10 +91,10 @@ const INSIDE: f64 = -1.0;
 const USUAL_LAYER: f64 = 1.5;
 
 /// Fraction of the cells outside of conductors that are to be interpolated, as long as the table stays small. A point in one of
-/// the others costs as much as filling a node: a grid of twice as many nodes pays off with the first few thousand points.
+/// the others takes some eight times as long as an interpolated one (`field/benches`).
 const WIDE: f64 = 0.85;
 
-/// Nodes times basis functions above which that is no longer asked for: some 20 MB, a second to fill.
+/// Nodes times basis functions above which that is no longer asked for: some 20 MB.
 const WIDE_NODES: usize = 100_000;
 
 /// Points at which the error is measured, for each thickness of layer. The largest error of 400 points misses the largest of
@@ -119,7 +119,7 @@ pub fn tabulate(
 const COVERED: f64 = 0.9;
 
 /// As [`tabulate`], with a spacing so small that the table holds most points of interest (where grains start, say): a cell next
-/// to a conductor is left to the exact sum, which takes a hundred times as long.
+/// to a conductor is left to the exact sum, which takes some eight times as long (`field/benches`).
 ///
 /// # Errors
 /// As [`tabulate`].

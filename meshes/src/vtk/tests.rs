@@ -365,7 +365,7 @@ fn collection_names_files_and_times() {
     for frames in [[(0.0, "a"), (0.0, "b")], [(1.0, "a"), (0.5, "b")], [(0.0, "a"), (f64::NAN, "b")]] {
         assert!(refusal(|out| write_collection(out, &frames)).starts_with("frame 1 is at time"));
     }
-    for name in ["", "/tmp/a.vtp", "../a.vtp", "a\n.vtp"] {
+    for name in ["", "/a.vtp", "../a.vtp", "a\n.vtp"] {
         assert!(refusal(|out| write_collection(out, &[(0.0, name)])).starts_with("frame 0 names the file"));
     }
 }
