@@ -36,6 +36,7 @@
 
 pub mod import;
 pub mod lattice;
+pub mod profile;
 pub mod report;
 pub mod shape;
 pub mod surface;
@@ -44,6 +45,7 @@ pub mod triangle;
 pub mod triangulate;
 pub mod vtk;
 
+pub use profile::{Curve, Joint, Profile, Revolved, revolved};
 pub use report::{ElectrodeReport, MeshReport};
 pub use shape::{GridPattern, Hole, Outline, Placement, Shape, ShapeError, Weave};
 pub use surface::{ElectrodeSurface, SurfaceMesh};

@@ -17,6 +17,8 @@ mod tube;
 
 use std::collections::HashMap;
 
+pub(crate) use tube::CLEARANCE;
+
 use crate::{GridPattern, Placement, Shape, ShapeError, Vec3};
 
 /// Triangles of one shape.

@@ -10,7 +10,7 @@ use crate::{Outline, Vec3, Weave};
 
 /// Gap between wires that cross, in wire radii, so that their panels stay apart. All wires of a grid have one potential:
 /// the gap only keeps the mesh clean.
-const CLEARANCE: f64 = 0.1;
+pub(crate) const CLEARANCE: f64 = 0.1;
 
 /// Number of panels round a wire.
 fn sides(fineness: f64) -> usize {
