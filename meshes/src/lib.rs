@@ -36,6 +36,7 @@
 
 pub mod import;
 pub mod lattice;
+pub mod patch;
 pub mod profile;
 pub mod report;
 pub mod shape;
@@ -45,6 +46,7 @@ pub mod triangle;
 pub mod triangulate;
 pub mod vtk;
 
+pub use patch::{Column, Patch, PatchForm, Path, Side, patches};
 pub use profile::{Curve, Joint, Profile, Revolved, revolved};
 pub use report::{ElectrodeReport, MeshReport};
 pub use shape::{GridPattern, Hole, Outline, Placement, Shape, ShapeError, Weave};
