@@ -58,6 +58,7 @@ pub mod capacitance;
 pub mod channels;
 pub mod coarse;
 pub mod constants;
+pub mod curved;
 pub mod driven;
 pub mod electrode_basis;
 pub mod gather;

@@ -1,0 +1,102 @@
+//! The charge that curved elements carry.
+
+use std::sync::Arc;
+
+use faer::Mat;
+use meshes::Vec3;
+
+use super::element::{Ball, CurvedMesh};
+use super::kernel::Moments;
+use super::legendre::{MAX_ORDER, Transform, legendre};
+use crate::constants::COULOMB;
+
+/// Charges on a curved mesh, for each basis function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CurvedCharge {
+    /// The elements.
+    pub mesh: Arc<CurvedMesh>,
+    /// Charge per parameter at every point, over Coulomb's constant (V m): `function * points + point`.
+    pub values: Vec<f64>,
+    /// Number of basis functions.
+    pub functions: usize,
+    /// Relative accuracy to which integrals over the elements are taken.
+    pub accuracy: f64,
+}
+
+impl CurvedCharge {
+    /// From values at points (rows) for basis functions (columns).
+    pub fn new(mesh: CurvedMesh, values: &Mat<f64>, accuracy: f64) -> Self {
+        let columns = values.col_iter().flat_map(|c| c.iter().copied().collect::<Vec<_>>()).collect();
+        Self { mesh: Arc::new(mesh), values: columns, functions: values.ncols(), accuracy }
+    }
+
+    /// Values at the points of an element for one function.
+    pub fn of_element(&self, element: usize, function: usize) -> &[f64] {
+        let each = self.mesh.order * self.mesh.order;
+        let start = function * self.mesh.unknowns() + element * each;
+        &self.values[start..start + each]
+    }
+
+    /// Legendre coefficients on an element of a combination of basis functions.
+    pub fn combination(&self, element: usize, weights: &[f64], transform: &Transform) -> Moments {
+        let each = self.mesh.order * self.mesh.order;
+        let mut sum = vec![0.0; each];
+        for (function, weight) in weights.iter().enumerate() {
+            if *weight != 0.0 {
+                for (s, v) in sum.iter_mut().zip(self.of_element(element, function)) {
+                    *s += weight * v;
+                }
+            }
+        }
+        transform.coefficients(&sum)
+    }
+
+    /// Charge density of every basis function at points near the surface, each with its electrode: C/m² per volt,
+    /// `point * functions + function`.
+    pub fn densities(&self, points: &[(Vec3, usize)]) -> Vec<f64> {
+        let mesh = &*self.mesh;
+        let transform = Transform::new(mesh.order);
+        let balls: Vec<Ball> = mesh.patches.iter().map(|p| Ball::new(p, [0.0; 2], [1.0; 2])).collect();
+        let mut of_patch: Vec<Vec<usize>> = vec![Vec::new(); mesh.patches.len()];
+        for (e, element) in mesh.elements.iter().enumerate() {
+            of_patch[element.patch as usize].push(e);
+        }
+        let mut densities = vec![0.0; points.len() * self.functions];
+        for ((point, electrode), out) in points.iter().zip(densities.chunks_exact_mut(self.functions)) {
+            // The patch whose surface is nearest; patches reach some 1.5 of their ball where they bend.
+            let mut best: Option<(f64, usize, [f64; 2])> = None;
+            for (p, ball) in balls.iter().enumerate() {
+                let least = (point - ball.center).norm() - 1.5 * ball.reach;
+                if mesh.electrode[p] as usize != *electrode || best.is_some_and(|(d, ..)| least > d) {
+                    continue;
+                }
+                let at = mesh.patches[p].parameters(point);
+                let distance = (mesh.patches[p].at(at[0], at[1]) - point).norm();
+                if best.is_none_or(|(d, ..)| distance < d) {
+                    best = Some((distance, p, at));
+                }
+            }
+            let Some((_, patch, at)) = best else { continue };
+            let holds = |e: &&usize| {
+                let element = &mesh.elements[**e];
+                (0..2).all(|k| at[k] >= element.low[k] && at[k] <= element.high[k])
+            };
+            let Some(&e) = of_patch[patch].iter().find(holds) else { continue };
+            let element = &mesh.elements[e];
+            let width = [0, 1].map(|k| element.high[k] - element.low[k]);
+            // Off the very edge, where the density is infinite.
+            let local = [0, 1].map(|k| ((at[k] - element.low[k]) / width[k]).clamp(1e-3, 1.0 - 1e-3));
+            let inside = element.parameters(local[0], local[1]);
+            let [s, t] = mesh.patches[patch].tangents(inside[0], inside[1]);
+            let area = s.cross(&t).norm() * width[0] * width[1];
+            let (pu, pv) = (legendre(local[0]), legendre(local[1]));
+            for (function, out) in out.iter_mut().enumerate() {
+                let c = transform.coefficients(self.of_element(e, function));
+                let charge: f64 =
+                    (0..MAX_ORDER).map(|i| (0..MAX_ORDER).map(|j| c[i][j] * pu[i] * pv[j]).sum::<f64>()).sum();
+                *out = charge / (area * COULOMB);
+            }
+        }
+        densities
+    }
+}

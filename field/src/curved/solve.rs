@@ -1,0 +1,163 @@
+//! Solving for the charge of a curved mesh.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::lu::partial_pivoting as lu;
+use faer::{Mat, Par};
+use meshes::Vec3;
+
+use super::assembly::Assembly;
+use super::charge::CurvedCharge;
+use super::element::CurvedMesh;
+use super::legendre::gauss;
+use super::symmetry::Symmetry;
+use crate::boundary_problem::SolveError;
+use crate::constants::COULOMB;
+use crate::source::Source;
+
+/// The electrostatic problem of conductors with curved elements.
+#[derive(Clone, Copy, Debug)]
+pub struct CurvedProblem<'a> {
+    /// Names of the electrodes, for errors.
+    pub names: &'a [String],
+    /// Fields in closed form; each induces charges on the electrodes.
+    pub sources: &'a [Source],
+    /// Make use of symmetry where there is any.
+    pub symmetric: bool,
+}
+
+/// Charges of a curved mesh, and what they add up to.
+#[derive(Clone, Debug)]
+pub struct CurvedSolution {
+    /// The charges.
+    pub charge: CurvedCharge,
+    /// Charge on each electrode (row) for each basis function (column), C.
+    pub totals: Vec<Vec<f64>>,
+    /// Unknowns after symmetry, of all sectors together.
+    pub unknowns: usize,
+    /// Order of the symmetry group.
+    pub symmetry: usize,
+    /// Bytes of the matrices.
+    pub matrix_bytes: u64,
+    /// Filling them, s.
+    pub assembly_seconds: f64,
+    /// Factorising and solving, s.
+    pub solve_seconds: f64,
+}
+
+impl CurvedProblem<'_> {
+    /// Wanted potentials at the points, V: a column for each electrode, then one for each source.
+    fn wanted(&self, mesh: &CurvedMesh, points: &[Vec3], electrode: &[u32]) -> Result<Mat<f64>, SolveError> {
+        let mut wanted = Mat::<f64>::zeros(points.len(), mesh.electrodes + self.sources.len());
+        for (p, &e) in electrode.iter().enumerate() {
+            wanted[(p, e as usize)] = 1.0;
+        }
+        for (s, source) in self.sources.iter().enumerate() {
+            for (p, point) in points.iter().enumerate() {
+                let outside = source.potential_and_gradient(point).0;
+                if !outside.is_finite() {
+                    let electrode = self.names[electrode[p] as usize].clone();
+                    return Err(SolveError::SourceOnElectrode { source_number: s + 1, electrode });
+                }
+                wanted[(p, mesh.electrodes + s)] = -outside;
+            }
+        }
+        Ok(wanted)
+    }
+
+    fn symmetry(&self, points: &[Vec3], electrode: &[u32], wanted: &Mat<f64>) -> Symmetry {
+        if self.symmetric { Symmetry::find(points, electrode, wanted) } else { Symmetry::none(points.len()) }
+    }
+
+    /// Bytes that [`CurvedProblem::solve`] takes for that many unknowns after symmetry in each of some sectors, and points.
+    pub fn memory_needed(unknowns: usize, sectors: usize, points: usize) -> u64 {
+        let (n, s, p) = (unknowns as u64, sectors as u64, points as u64);
+        8 * (s * n * n + 64 * p * 2 + 60 * p)
+    }
+
+    /// Solves for every electrode at 1 V with the others at 0 V, and for every source of strength one with all electrodes at
+    /// 0 V. `accuracy` is that of the integrals, relative.
+    ///
+    /// # Errors
+    /// A source on an electrode.
+    pub fn solve(
+        &self,
+        mesh: &CurvedMesh,
+        accuracy: f64,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<CurvedSolution, SolveError> {
+        let start = std::time::Instant::now();
+        let (points, electrode) = (mesh.points(), mesh.electrode_of_points());
+        let wanted = self.wanted(mesh, &points, &electrode)?;
+        let symmetry = self.symmetry(&points, &electrode, &wanted);
+        let parts: Vec<(u32, Mat<f64>)> = (0..1_u32 << symmetry.mirrors)
+            .map(|sector| (sector, symmetry.part(sector, &wanted)))
+            .filter(|(_, part)| part.col_iter().any(|c| c.iter().any(|v| v.abs() > 1e-14)))
+            .collect();
+        let sectors: Vec<u32> = parts.iter().map(|(sector, _)| *sector).collect();
+        let matrices = Assembly::new(mesh, &points, accuracy).matrices(&symmetry, &sectors, &|f| progress(0.9 * f));
+        let assembled = std::time::Instant::now();
+        let mut values = Mat::<f64>::zeros(points.len(), wanted.ncols());
+        let (mut unknowns, mut matrix_bytes) = (0, 0);
+        for ((sector, part), matrix) in parts.iter().zip(matrices) {
+            let (of, own) = symmetry.orbits(*sector);
+            unknowns += own.len();
+            matrix_bytes += 8 * (own.len() * own.len()) as u64;
+            let mut columns = Mat::from_fn(own.len(), part.ncols(), |i, c| part[(own[i] as usize, c)]);
+            solve_transposed(matrix, &mut columns);
+            for c in 0..part.ncols() {
+                for (p, orbit) in of.iter().enumerate() {
+                    if let Some((unknown, sign)) = orbit {
+                        values[(p, c)] += sign * columns[(*unknown as usize, c)];
+                    }
+                }
+            }
+        }
+        let each = mesh.order * mesh.order;
+        let rule = gauss(mesh.order);
+        let mut totals = vec![vec![0.0; wanted.ncols()]; mesh.electrodes];
+        for p in 0..points.len() {
+            let local = p % each;
+            let weight = rule.weights[local / mesh.order] * rule.weights[local % mesh.order] / COULOMB;
+            for (c, total) in totals[electrode[p] as usize].iter_mut().enumerate() {
+                *total += weight * values[(p, c)];
+            }
+        }
+        Ok(CurvedSolution {
+            charge: CurvedCharge::new(mesh.clone(), &values, accuracy),
+            totals,
+            unknowns,
+            symmetry: symmetry.order(),
+            matrix_bytes,
+            assembly_seconds: (assembled - start).as_secs_f64(),
+            solve_seconds: assembled.elapsed().as_secs_f64(),
+        })
+    }
+}
+
+/// Solves A x = b for the transpose of A, which is overwritten.
+fn solve_transposed(mut matrix: Mat<f64>, columns: &mut Mat<f64>) {
+    let (n, par) = (matrix.nrows(), Par::rayon(0));
+    if n == 0 {
+        return;
+    }
+    let (mut forward, mut backward) = (vec![0_usize; n], vec![0_usize; n]);
+    let mut memory = MemBuffer::new(lu::factor::lu_in_place_scratch::<usize, f64>(n, n, par, Default::default()));
+    let (_, permutation) = lu::factor::lu_in_place(
+        matrix.as_mut(),
+        &mut forward,
+        &mut backward,
+        par,
+        MemStack::new(&mut memory),
+        Default::default(),
+    );
+    let scratch = lu::solve::solve_transpose_in_place_scratch::<usize, f64>(n, columns.ncols(), par);
+    let mut memory = MemBuffer::new(scratch);
+    lu::solve::solve_transpose_in_place(
+        matrix.as_ref(),
+        matrix.as_ref(),
+        permutation,
+        columns.as_mut(),
+        par,
+        MemStack::new(&mut memory),
+    );
+}
