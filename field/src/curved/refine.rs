@@ -31,13 +31,13 @@ impl Level {
     fn first(accuracy: f64) -> Self {
         let digits = -accuracy.log10();
         Self {
-            order: (digits.round() as usize).clamp(3, MAX_ORDER - 1),
-            depth: (digits - 3.0).clamp(0.0, 6.0).round() as usize,
+            order: (digits.round() as usize - 1).clamp(2, MAX_ORDER - 1),
+            depth: (digits - 5.0).clamp(0.0, 6.0).round() as usize,
         }
     }
 
     fn next(self) -> Self {
-        Self { order: (self.order + 1).min(MAX_ORDER), depth: self.depth + 1 }
+        Self { order: (self.order + 1).min(MAX_ORDER), depth: self.depth }
     }
 }
 
@@ -74,40 +74,45 @@ pub fn solve_to(
     for round in 1.. {
         // Integrals to a hundredth of what is asked.
         let solution = problem.solve(&mesh, 0.01 * accuracy, &|f| progress(&mesh, f))?;
-        let mut last = round == ROUNDS;
+        let mut missed = false;
         if let Some(coarse) = before {
-            let error = difference(&solution, &coarse);
+            let error = TRUST * difference(&solution, &coarse);
             if error <= accuracy {
                 return Ok(Refined { solution: coarse, error, judged_by: solution.unknowns });
             }
-            let next = level.next();
-            let elements = graded(patches, &vertices, refined(&solution, accuracy), next.depth);
-            let finer = CurvedMesh { elements, order: next.order, ..mesh.clone() };
-            last |= finer.unknowns() / solution.symmetry > limit;
-            if last {
-                // Nothing better can be had: the error of the coarser one bounds that of the better.
+            missed = true;
+            if round == ROUNDS {
                 return Ok(Refined { solution, error, judged_by: 0 });
             }
-            (level, mesh) = (next, finer);
-        } else {
-            let next = level.next();
-            let elements = graded(patches, &vertices, refined(&solution, accuracy), next.depth);
-            mesh = CurvedMesh { elements, order: next.order, ..mesh };
-            level = next;
         }
+        level = level.next();
+        let elements = graded(patches, &vertices, refined(&solution, accuracy, missed), level.depth);
+        let finer = CurvedMesh { elements, order: level.order, ..mesh };
+        if finer.unknowns() / solution.symmetry > limit && missed {
+            // Nothing better can be had: the error of the coarser one bounds that of the better.
+            return Ok(Refined { solution, error: f64::NAN, judged_by: 0 });
+        }
+        mesh = finer;
         before = Some(solution);
     }
     unreachable!("the last round returns")
 }
 
+/// The error of a solution over its difference from a better one: the better one errs as well, by a fifth as much or less.
+const TRUST: f64 = 1.2;
+
 /// How much of the largest roughness an element may have without being divided.
 const SHARE: f64 = 0.1;
+
+/// Roughness of an element that does not count at first, over √(accuracy / number of elements): a charge that is wrong by δ
+/// makes an error of δ² in the energy.
+const HARMLESS: f64 = 0.1;
 
 /// Divides elements on which the charge is rough, in the directions in which it is.
 ///
 /// What the last two Legendre coefficients of a direction hold is what the next ones may hold: an estimate of the charge that
 /// the element misses.
-fn refined(solution: &CurvedSolution, accuracy: f64) -> Vec<Element> {
+fn refined(solution: &CurvedSolution, accuracy: f64, missed: bool) -> Vec<Element> {
     let (charge, mesh) = (&solution.charge, &*solution.charge.mesh);
     let transform = Transform::new(mesh.order);
     let last = mesh.order - 1;
@@ -136,7 +141,8 @@ fn refined(solution: &CurvedSolution, accuracy: f64) -> Vec<Element> {
         .collect();
     let worst = rough.iter().flatten().fold(0.0_f64, |m, r| m.max(*r));
     // Ties within rounding are decided alike, so that a symmetric mesh stays symmetric.
-    let threshold = (SHARE * worst).max(0.1 * accuracy / (mesh.elements.len() as f64).sqrt());
+    let harmless = if missed { 0.0 } else { HARMLESS * (accuracy / mesh.elements.len() as f64).sqrt() };
+    let threshold = (SHARE * worst).max(harmless);
     let mut elements = Vec::new();
     for (element, rough) in mesh.elements.iter().zip(&rough) {
         let rounded = rough.map(|r| (r * 1e6 / threshold).round() / 1e6);

@@ -45,7 +45,7 @@ fn explore() {
     ];
     for (name, shape, exact) in cases.into_iter().chain(more) {
         for accuracy in [1e-3, 1e-4, 1e-5, 1e-6] {
-            if name.ends_with("10") && accuracy < 5e-5 {
+            if name.ends_with("10") && accuracy < 5e-6 {
                 continue;
             }
             let start = std::time::Instant::now();
