@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::case::Case;
 use crate::output::OutputFolder;
 use crate::pipeline::Failure;
+use crate::pipeline::choice::Choice;
 use crate::pipeline::solution::Solution;
 use crate::pipeline::tables::Tabulated;
 
@@ -23,7 +24,7 @@ pub const FILE: &str = "cache/fields.bin";
 const LARGEST_TABLE: u64 = 256 << 20;
 
 /// What stands at the beginning of a file; the number changes with the format.
-const MAGIC: &[u8] = b"graintrap fields 1\n";
+const MAGIC: &[u8] = b"graintrap fields 2\n";
 
 /// Everything that a solution and a table depend on.
 pub fn key(case: &Case) -> [u8; 32] {
@@ -94,6 +95,7 @@ struct Stored {
     unknowns: usize,
     residual: f64,
     matrix_bytes: u64,
+    choice: Choice,
     error_estimate: f64,
     estimated_by: String,
     table: Option<StoredTable>,
@@ -131,6 +133,7 @@ impl Stored {
             unknowns: basis.report.unknowns,
             residual: basis.report.residual,
             matrix_bytes: basis.report.matrix_bytes,
+            choice: solution.choice.clone(),
             error_estimate: solution.error_estimate,
             estimated_by: solution.estimated_by.clone(),
             table: table.map(|t| StoredTable {
@@ -171,6 +174,7 @@ impl Stored {
             ElectrodeBasis::from_charges(mesh, sources.to_vec(), &self.charges, capacitance, self.induced, report);
         let solution = Solution {
             basis,
+            choice: self.choice,
             error_estimate: self.error_estimate,
             estimated_by: self.estimated_by,
             mesh_seconds: 0.0,

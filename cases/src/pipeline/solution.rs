@@ -6,17 +6,20 @@ use field::influence::Testing;
 use field::{BasisField, BoundaryProblem, ElectrodeBasis, Samples, SolveError, Source};
 use meshes::{SurfaceMesh, Vec3};
 
+use super::choice::{Choice, Elements};
 use super::ready::Ready;
 use super::surface::Electrodes;
 use super::{Failure, Reporter, memory, region};
 use crate::CaseSource;
-use crate::case::{Case, Method};
+use crate::case::Case;
 
 /// A solved case.
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// The unit solutions, with their mesh.
     pub basis: ElectrodeBasis,
+    /// What solved for its charges, and why that.
+    pub choice: Choice,
     /// Estimated relative error: the larger of those of the capacitance matrix (against its largest entry) and of the unit
     /// fields at points in the trap region (against the strongest of each), between two meshes.
     pub error_estimate: f64,
@@ -54,6 +57,7 @@ pub fn solve(case: &Case, source: &CaseSource, ready: &Ready, reporter: &dyn Rep
         reporter,
         sources: &ready.sources,
         electrodes: &ready.electrodes,
+        choice: &ready.choice,
         mesh_seconds: 0.0,
         solve_seconds: 0.0,
     };
@@ -106,6 +110,7 @@ pub fn starting_mesh(case: &Case, source: &CaseSource, ready: &Ready) -> Result<
         reporter: &super::Silent,
         sources: &ready.sources,
         electrodes: &ready.electrodes,
+        choice: &ready.choice,
         mesh_seconds: 0.0,
         solve_seconds: 0.0,
     };
@@ -123,6 +128,7 @@ struct Work<'a> {
     reporter: &'a dyn Reporter,
     sources: &'a [Source],
     electrodes: &'a Electrodes,
+    choice: &'a Choice,
     mesh_seconds: f64,
     solve_seconds: f64,
 }
@@ -151,9 +157,10 @@ impl Work<'_> {
 
     fn solve(&mut self, mesh: &SurfaceMesh, with_coarse: bool) -> Result<ElectrodeBasis, Failure> {
         let start = Instant::now();
-        let testing = match self.case.field.method {
-            Method::Galerkin => Testing::Galerkin,
-            Method::Collocation => Testing::Collocation,
+        let testing = match self.choice.elements {
+            Elements::Galerkin => Testing::Galerkin,
+            Elements::Collocation => Testing::Collocation,
+            Elements::Curved => unreachable!("refused by `choose` until it is connected here"),
         };
         let problem = BoundaryProblem { mesh, sources: self.sources, testing, with_coarse };
         let told = problem.solve_telling(&|done| self.reporter.fraction(done));
@@ -286,6 +293,7 @@ impl Work<'_> {
         }
         Solution {
             basis,
+            choice: self.choice.clone(),
             error_estimate,
             estimated_by: estimated_by.to_owned(),
             mesh_seconds: self.mesh_seconds,
