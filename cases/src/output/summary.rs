@@ -62,6 +62,8 @@ pub struct SolveSummary {
     pub unknowns: usize,
     /// What solved it: `dense`, `symmetric`, `axisymmetric`, `multipole`, or `none` where there are no electrodes.
     pub solver: &'static str,
+    /// `solved` now, or `kept` from an earlier command.
+    pub solution: &'static str,
     /// Why that solver, in a sentence.
     pub solver_reason: String,
     /// What the charges sit on: `galerkin`, `collocation` or `curved`.
@@ -197,6 +199,7 @@ impl SolveSummary {
             panels: basis.panels.len(),
             unknowns: basis.report.unknowns,
             solver: if electrodes == 0 { "none" } else { solution.choice.solver.name() },
+            solution: if solution.kept { "kept" } else { "solved" },
             solver_reason: solution.choice.why.clone(),
             elements: solution.choice.elements.name(),
             error_estimate: solution.error_estimate,
