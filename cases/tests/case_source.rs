@@ -132,7 +132,9 @@ fn parts_change_with_what_they_hold() {
     assert_eq!((&base.geometry, &base.table, &base.grains), (&louder.geometry, &louder.table, &louder.grains));
     assert_ne!(base.drives, louder.drives);
     assert_ne!(base.geometry, parts(&["electrode.left.radius=11 mm"]).geometry);
+    assert_ne!(base.geometry, parts(&["field.solver=dense"]).geometry);
     assert_ne!(base.table, parts(&["table.accuracy=1e-5"]).table);
+    assert_eq!(base.geometry, parts(&["table.accuracy=1e-5"]).geometry);
     assert_ne!(base.grains, parts(&["forces.coulomb=true"]).grains);
 }
 

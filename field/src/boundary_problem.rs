@@ -8,6 +8,7 @@ use faer::linalg::lu::partial_pivoting as lu;
 use faer::{Mat, Par};
 use meshes::SurfaceMesh;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::capacitance::CapacitanceMatrix;
 use crate::coarse::coarse_capacitance;
@@ -81,13 +82,15 @@ const RESIDUAL: f64 = 1e-7;
 const CHECKED_ROWS: usize = 64;
 
 /// Seconds spent where, and how well the equations hold.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SolveReport {
     /// Number of unknowns.
     pub unknowns: usize,
-    /// Filling the matrix, s.
+    /// Filling the matrix, s. Not stored: what is kept took no time.
+    #[serde(skip)]
     pub assembly_seconds: f64,
-    /// Factorising it and solving, s.
+    /// Factorising it and solving, s. Not stored.
+    #[serde(skip)]
     pub solve_seconds: f64,
     /// Largest error of the potential on the rows that were looked at, V per V.
     pub residual: f64,

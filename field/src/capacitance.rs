@@ -1,9 +1,10 @@
 //! The capacitance matrix and what must hold for it.
 
 use faer::Mat;
+use serde::{Deserialize, Serialize};
 
 /// Charges on the electrodes for unit voltages: Q_i = Σ_k C_ik V_k (Maxwell's form), farad.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CapacitanceMatrix {
     /// Symmetric: the mean of what came out of the solution and its transpose. F.
     pub matrix: Vec<Vec<f64>>,

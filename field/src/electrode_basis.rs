@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use faer::Mat;
 use meshes::SurfaceMesh;
+use serde::{Deserialize, Serialize};
 
 use crate::boundary_problem::SolveReport;
 use crate::capacitance::CapacitanceMatrix;
@@ -14,7 +15,11 @@ use crate::source::Source;
 
 /// Unit solutions: basis function k is electrode k at 1 V with the others at 0 V; after the electrodes come the sources, each
 /// of strength one with all electrodes at 0 V.
-#[derive(Clone, Debug)]
+///
+/// It can be stored with serde, and comes back the same to the last bit, without what can be found again: panels, times, the
+/// coarse capacitances.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(try_from = "Stored", into = "Stored")]
 pub struct ElectrodeBasis {
     /// The surface.
     pub mesh: SurfaceMesh,
@@ -84,5 +89,54 @@ impl ElectrodeBasis {
     pub fn combined(&self, weights: &[Vec<f64>]) -> PanelSum {
         assert!(weights.iter().all(|row| row.len() == self.functions()), "a weight for each basis function");
         PanelSum::new(self, weights.iter().map(|row| Arc::from(row.as_slice())).collect())
+    }
+}
+
+/// A solution as it is stored.
+#[derive(Serialize, Deserialize)]
+struct Stored {
+    mesh: SurfaceMesh,
+    sources: Vec<Source>,
+    charge: StoredCharge,
+    capacitance: CapacitanceMatrix,
+    induced: Vec<Vec<f64>>,
+    report: SolveReport,
+}
+
+/// Charges as they are stored: a variant for each way to represent them.
+#[derive(Serialize, Deserialize)]
+enum StoredCharge {
+    /// Constant on each panel, C: basis function after basis function.
+    Panels(Vec<f64>),
+}
+
+impl From<ElectrodeBasis> for Stored {
+    fn from(basis: ElectrodeBasis) -> Self {
+        let charge = StoredCharge::Panels(basis.charges());
+        let ElectrodeBasis { mesh, sources, capacitance, induced, report, .. } = basis;
+        Self { mesh, sources, charge, capacitance, induced, report }
+    }
+}
+
+impl TryFrom<Stored> for ElectrodeBasis {
+    type Error = &'static str;
+
+    /// Numbers that do not fit together make no solution.
+    fn try_from(stored: Stored) -> Result<Self, Self::Error> {
+        let Stored { mesh, sources, charge, capacitance, induced, report } = stored;
+        let (panels, electrodes) = (mesh.triangles.len(), mesh.electrodes.len());
+        let corners = mesh.triangles.iter().flatten().all(|v| (*v as usize) < mesh.vertices.len());
+        let owners = mesh.electrode.len() == panels && mesh.electrode.iter().all(|e| (*e as usize) < electrodes);
+        let square =
+            |rows: &[Vec<f64>], columns: usize| rows.len() == electrodes && rows.iter().all(|row| row.len() == columns);
+        if !corners || !owners || !square(&capacitance.matrix, electrodes) || !square(&induced, sources.len()) {
+            return Err("the mesh or the capacitances do not fit together");
+        }
+        match charge {
+            StoredCharge::Panels(charges) if panels.checked_mul(electrodes + sources.len()) == Some(charges.len()) => {
+                Ok(Self::from_charges(mesh, sources, &charges, capacitance, induced, report))
+            }
+            StoredCharge::Panels(_) => Err("not a charge for each panel and basis function"),
+        }
     }
 }

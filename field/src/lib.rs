@@ -83,6 +83,7 @@ pub use panel::Panel;
 pub use panel_sum::PanelSum;
 pub use source::{Source, SourceKind};
 pub use table::{
-    Grid, PotentialTable, TableError, TableOptions, TableReport, TabulatedField, tabulate, tabulate_around,
+    Grid, PotentialTable, TableError, TableOptions, TableReport, TabulatedField, starting_spacing, tabulate,
+    tabulate_around, tabulate_from,
 };
 pub use waveform::{Waveform, WaveformPart};

@@ -4,11 +4,12 @@ use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
 use ellip::{elliprd, elliprf};
 use meshes::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::constants::COULOMB;
 
 /// The form of a closed-form field of strength one, in its local frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum SourceKind {
     /// The field between rods far away along `e3`: φ = (x² - y²) / (2 r0²) for 1 V between the two pairs.
     PlanarQuadrupole {
@@ -34,7 +35,7 @@ pub enum SourceKind {
 }
 
 /// A closed-form field of strength one, in place.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Source {
     /// Its form.
     pub kind: SourceKind,

@@ -2,10 +2,12 @@
 
 use std::collections::HashMap;
 
+use serde::{Deserialize, Serialize};
+
 use crate::{Triangulation, Vec3};
 
 /// What one electrode is, apart from its panels.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ElectrodeSurface {
     /// Its name in the case file; unique.
     pub name: String,
@@ -18,7 +20,7 @@ pub struct ElectrodeSurface {
 /// All electrodes as triangles.
 ///
 /// Vertices are shared inside an electrode and never between electrodes.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceMesh {
     /// Corner points, m.
     pub vertices: Vec<Vec3>,

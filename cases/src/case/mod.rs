@@ -9,7 +9,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-pub use crate::keys::settings::{Gas, Integrator, Method, Reflection};
+pub use crate::keys::settings::{Gas, Integrator, Method, Reflection, Solver};
 pub use electrode::{Drive, Electrode, ElectrodeShape, ImportedMesh, MeshFormat, Source, SourceKind};
 pub use parts::CaseParts;
 pub use settings::{

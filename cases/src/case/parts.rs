@@ -8,15 +8,18 @@ use super::Case;
 ///
 /// | cached | depends on |
 /// |---|---|
-/// | mesh, unit solutions, capacitances, table of unit potentials | `geometry`, `table`, `starts` |
+/// | mesh, unit solutions, capacitances | `geometry`, `sources` |
+/// | table of unit potentials | `geometry`, `sources`, `table`, and what it takes from `starts`: its box and its first spacing |
 /// | trajectories | all |
 ///
 /// Imported meshes enter by the hash of their bytes and not by their path, so that a moved case keeps its cache.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CaseParts {
-    /// Names, shapes and places of the electrodes, and how the field is computed.
+    /// Names, shapes and places of the electrodes, how the field is computed, and where it is to be as exact as asked.
     pub geometry: String,
-    /// Sources without their strength, and the settings of the table.
+    /// Sources without their strength.
+    pub sources: String,
+    /// The settings of the table.
     pub table: String,
     /// Where grains start: a box that the case leaves open is chosen around them.
     pub starts: String,
@@ -47,8 +50,9 @@ impl Case {
             entries.map(|entry| json!([entry["name"], entry[key]])).collect()
         };
         CaseParts {
-            geometry: json!([without("electrodes", "drive"), whole["field"]]).to_string(),
-            table: json!([without("sources", "waveform"), whole["table"]]).to_string(),
+            geometry: json!([without("electrodes", "drive"), whole["field"], whole["table"]["region"]]).to_string(),
+            sources: without("sources", "waveform").to_string(),
+            table: whole["table"].to_string(),
             starts: of("grains", "place").to_string(),
             drives: json!([of("electrodes", "drive"), of("sources", "waveform")]).to_string(),
             grains: json!([whole["grains"], whole["forces"], whole["trace"], whole["output"]]).to_string(),

@@ -4,7 +4,7 @@ use meshes::Vec3;
 use serde::Serialize;
 use tracer::{Launch, Place};
 
-use super::{Gas, Integrator, Method, Reflection, foreign};
+use super::{Gas, Integrator, Method, Reflection, Solver, foreign};
 
 /// How exactly the field is computed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -15,7 +15,9 @@ pub struct FieldSettings {
     pub panels: Option<usize>,
     /// No more panels than this.
     pub max_panels: usize,
-    /// How the boundary condition is tested.
+    /// What solves for the charges.
+    pub solver: Solver,
+    /// What the charges sit on and how the boundary condition is imposed on them.
     pub method: Method,
 }
 

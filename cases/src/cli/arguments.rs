@@ -27,7 +27,7 @@ pub(super) enum Verb {
     Probe(ProbeArguments),
     /// Tabulate the potential and measure the table's error
     Table(Common),
-    /// Like run, but reuse the solution and the table that an earlier run kept
+    /// Like run, for a case that must have grains to trace
     Trace(Common),
     /// Print the JSON Schema of the case file, for editors
     Schema,
@@ -63,6 +63,12 @@ pub(super) struct Common {
     /// Change any key of the case, as electrode.left.dc="7 V"; may be given many times
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
+    /// Compute everything anew, whatever earlier commands kept
+    #[arg(long)]
+    pub fresh: bool,
+    /// Folder that keeps solutions and tables of many cases [default: the last ones, in the output folder]
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
     /// Threads to work with [default: one for each processor]; results do not depend on it
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<usize>,

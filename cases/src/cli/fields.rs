@@ -3,14 +3,13 @@
 use std::time::Instant;
 
 use super::session::Session;
-use crate::cache;
 use crate::output::field_map::{FieldMap, NODES};
 use crate::output::summary::{SolveSummary, Summary, TableSummary};
 use crate::output::{OutputFolder, electrodes, field_map, pictures};
 use crate::pipeline::drives::{Driven, strengths, tabulated_field};
 use crate::pipeline::ready::{Ready, check_starts_again, ready};
 use crate::pipeline::solution::{Solution, solve};
-use crate::pipeline::tables::{Tabulated, table};
+use crate::pipeline::tables::{Plan, Tabulated, table};
 use crate::pipeline::{Failure, Reporter, memory, region};
 
 /// How far a verb goes.
@@ -24,23 +23,44 @@ pub(super) fn fields(session: &Session, extent: Extent) -> Result<(), Failure> {
     let mut out = session.output()?;
     let ready = ready(&session.case, &session.source, &*session.progress)?;
     let solution = solved(session, &ready)?;
-    let tabulated = match extent {
+    let planned = match extent {
         Extent::Solution => None,
-        Extent::Table => Some(table(&session.case, &session.source, &solution.basis, &*session.progress)?),
+        Extent::Table => Some(tabulated(session, &solution)?),
     };
     let mut summary = session.summary(if extent == Extent::Table { "table" } else { "solve" });
     let start = Instant::now();
-    write(session, &mut out, &mut summary, &solution, tabulated.as_ref())?;
-    cache::write(&mut out, &session.case, &solution, tabulated.as_ref())?;
+    write(session, &mut out, &mut summary, &solution, planned.as_ref().map(|(_, tabulated)| tabulated))?;
+    let planned = planned.as_ref().map(|(plan, tabulated)| (plan, tabulated));
+    session.cache.write(&mut out, &session.case, &solution, planned)?;
     summary.seconds.write = start.elapsed().as_secs_f64();
     session.finish(out, summary)
 }
 
-/// Solves, and checks that grains still start outside of the conductors that were solved.
+/// Solves, unless the solution was kept, and checks that grains still start outside of the conductors that were solved.
 pub(super) fn solved(session: &Session, ready: &Ready) -> Result<Solution, Failure> {
-    let solution = solve(&session.case, &session.source, ready, &*session.progress)?;
+    let solution = match session.kept(session.cache.solution(&session.case)) {
+        Some(solution) => {
+            solution.warnings.iter().for_each(|text| session.progress.warning(text));
+            solution
+        }
+        None => solve(&session.case, &session.source, ready, &*session.progress)?,
+    };
     check_starts_again(&session.case, &session.source, ready, &solution.basis)?;
     Ok(solution)
+}
+
+/// Tabulates, unless the table was kept.
+pub(super) fn tabulated(session: &Session, solution: &Solution) -> Result<(Plan, Tabulated), Failure> {
+    let (case, source, basis) = (&session.case, &session.source, &solution.basis);
+    let plan = Plan::new(case, source, basis)?;
+    let tabulated = match session.kept(session.cache.table(case, &plan)) {
+        Some(tabulated) => {
+            tabulated.warn_if_missed(case, &*session.progress);
+            tabulated
+        }
+        None => table(case, source, basis, &plan, &*session.progress)?,
+    };
+    Ok((plan, tabulated))
 }
 
 /// Writes the electrodes and, from a table, the field; fills in the summary. Gives the driven field, if there is a table.
@@ -55,6 +75,8 @@ pub(super) fn write(
     let start = case.trace.as_ref().map_or(0.0, |trace| trace.start);
     let strengths = strengths(case, basis, start);
     summary.solve = Some(SolveSummary::new(case, solution, &strengths));
+    summary.reused.extend(solution.kept.then_some("solution"));
+    summary.reused.extend(tabulated.filter(|tabulated| tabulated.kept).map(|_| "table"));
     summary.seconds.mesh = solution.mesh_seconds;
     summary.seconds.solve = solution.solve_seconds;
     out.write(electrodes::FILE, |w| electrodes::write(w, case, basis, &strengths))?;

@@ -7,11 +7,10 @@ use meshes::Vec3;
 use serde::Serialize;
 
 use super::arguments::ProbeArguments;
-use super::fields::solved;
+use super::fields::{solved, tabulated};
 use super::session::Session;
 use crate::pipeline::drives::{exact_field, tabulated_field};
 use crate::pipeline::ready::ready;
-use crate::pipeline::tables::table;
 use crate::pipeline::{Failure, region};
 use crate::quantity::{Kind, parse};
 
@@ -26,6 +25,8 @@ struct Probed {
     time: f64,
     /// `panel sum` or `table`.
     method: &'static str,
+    /// `solved` now, or `kept` from an earlier command.
+    solution: &'static str,
     /// Estimated relative error of the field.
     error_estimate: f64,
     points: Vec<Point>,
@@ -60,11 +61,7 @@ pub(super) fn probe(session: &Session, arguments: &ProbeArguments) -> Result<(),
     let points = read_points(&arguments.at)?;
     let mut out = session.output()?;
     let ready = ready(case, source, &*session.progress)?;
-    let kept = session.kept(&ready.sources);
-    let (solution, kept_table) = match kept {
-        Some((solution, table)) => (solution, table),
-        None => (solved(session, &ready)?, None),
-    };
+    let solution = solved(session, &ready)?;
     let basis = &solution.basis;
     let exact = basis.panel_sum();
     if let Some((line, p)) = points.iter().find(|(_, p)| exact.singular_at(p).is_some()) {
@@ -79,15 +76,14 @@ pub(super) fn probe(session: &Session, arguments: &ProbeArguments) -> Result<(),
         return Err(Failure::usage(problem, "move the point"));
     }
     let mut error_estimate = solution.error_estimate;
-    let (driven, covered) = if arguments.table {
-        let tabulated = match kept_table {
-            Some(table) => table,
-            None => table(case, source, basis, &*session.progress)?,
-        };
-        error_estimate = error_estimate.max(tabulated.report.error());
-        (tabulated_field(case, basis, &tabulated.table), Some(tabulated.table))
-    } else {
-        (exact_field(case, basis), None)
+    let planned = if arguments.table { Some(tabulated(session, &solution)?) } else { None };
+    session.cache.write(&mut out, case, &solution, planned.as_ref().map(|(plan, tabulated)| (plan, tabulated)))?;
+    let (driven, covered) = match planned {
+        Some((_, tabulated)) => {
+            error_estimate = error_estimate.max(tabulated.report.error());
+            (tabulated_field(case, basis, &tabulated.table), Some(tabulated.table))
+        }
+        None => (exact_field(case, basis), None),
     };
     let places: Vec<Vec3> = points.iter().map(|(_, p)| *p).collect();
     let mut scratch = Samples::default();
@@ -128,6 +124,7 @@ pub(super) fn probe(session: &Session, arguments: &ProbeArguments) -> Result<(),
         command: "probe",
         title: session.title(),
         time,
+        solution: if solution.kept { "kept" } else { "solved" },
         method: if arguments.table { "table" } else { "panel sum" },
         error_estimate,
         points: probed,

@@ -7,43 +7,27 @@ use meshes::SurfaceTree;
 
 use super::fields;
 use super::session::Session;
-use crate::cache;
 use crate::output::summary::TraceSummary;
 use crate::output::{pictures, tracks};
 use crate::pipeline::flights::fly;
-use crate::pipeline::ready::{check_starts_again, flight_region, ready};
-use crate::pipeline::tables::table;
+use crate::pipeline::ready::{flight_region, ready};
 use crate::pipeline::{Failure, Reporter};
 
-/// Mesh, solve, tabulate, trace, write; `reuse` takes solution and table from an earlier run where it can.
-pub(super) fn run(session: &Session, reuse: bool) -> Result<(), Failure> {
+/// Mesh, solve, tabulate, trace, write; `trace`: there must be grains.
+pub(super) fn run(session: &Session, trace: bool) -> Result<(), Failure> {
     let (case, source) = (&session.case, &session.source);
-    if reuse && case.grains.is_empty() {
+    if trace && case.grains.is_empty() {
         let help = "add [[grains]] and [trace] to it, or use `graintrap table` to look at its field";
         return Err(source.error_at("grains", "the case has no grains to trace", help).into());
     }
     let mut out = session.output()?;
     let ready = ready(case, source, &*session.progress)?;
-    let kept = if reuse { session.kept(&ready.sources) } else { None };
-    let mut summary = session.summary(if reuse { "trace" } else { "run" });
-    let (solution, kept_table) = match kept {
-        Some((solution, table)) => {
-            check_starts_again(case, source, &ready, &solution.basis)?;
-            summary.reused.push("solution");
-            (solution, table)
-        }
-        None => (fields::solved(session, &ready)?, None),
-    };
-    let tabulated = match kept_table {
-        Some(table) => {
-            summary.reused.push("table");
-            table
-        }
-        None => table(case, source, &solution.basis, &*session.progress)?,
-    };
+    let mut summary = session.summary(if trace { "trace" } else { "run" });
+    let solution = fields::solved(session, &ready)?;
+    let (plan, tabulated) = fields::tabulated(session, &solution)?;
     let start = Instant::now();
     let driven = fields::write(session, &mut out, &mut summary, &solution, Some(&tabulated))?;
-    cache::write(&mut out, case, &solution, Some(&tabulated))?;
+    session.cache.write(&mut out, case, &solution, Some((&plan, &tabulated)))?;
     let mut writing = start.elapsed().as_secs_f64();
     if let (Some(settings), Some(driven)) = (&case.trace, driven)
         && !ready.ensemble.is_empty()

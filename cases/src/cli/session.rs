@@ -6,10 +6,11 @@ use std::sync::Arc;
 use super::arguments::Common;
 use super::progress::Progress;
 use super::{interrupt, print};
+use crate::CaseSource;
+use crate::cache::{Cache, Unusable};
 use crate::case::Case;
 use crate::output::{OutputFolder, Summary};
 use crate::pipeline::{Failure, memory};
-use crate::{CaseSource, cache};
 
 /// An open case.
 pub(super) struct Session {
@@ -18,6 +19,8 @@ pub(super) struct Session {
     pub progress: Arc<Progress>,
     /// Where results go.
     pub folder: PathBuf,
+    /// Where solutions and tables are kept.
+    pub cache: Cache,
     quiet: bool,
     json: bool,
 }
@@ -26,11 +29,17 @@ impl Session {
     /// Reads the case.
     pub fn open(common: &Common) -> Result<Self, Failure> {
         let (case, source) = Case::read(&common.case, &common.set)?;
+        let folder = common.output.clone().unwrap_or_else(|| Path::new("out").join(name(&common.case)));
+        let cache = match &common.cache {
+            Some(shared) => Cache::shared(shared, common.fresh),
+            None => Cache::of_output(&folder, common.fresh),
+        };
         Ok(Self {
             case,
             source,
             progress: Arc::new(Progress::new(common.quiet)),
-            folder: common.output.clone().unwrap_or_else(|| Path::new("out").join(name(&common.case))),
+            folder,
+            cache,
             quiet: common.quiet,
             json: common.json,
         })
@@ -81,17 +90,14 @@ impl Session {
         }
     }
 
-    /// A solution and table kept in the output folder, with a word to the user if there is none.
-    pub fn kept(&self, sources: &[field::Source]) -> Option<cache::Fields> {
-        match cache::read(&self.folder, &self.case, sources) {
-            Ok(fields) => Some(fields),
-            Err(why) => {
-                if !self.quiet {
-                    eprintln!("{why}: computing the field anew");
-                }
-                None
+    /// What was kept, with a word to the user if a file is there that is of no use.
+    pub fn kept<T>(&self, read: Result<Option<T>, (PathBuf, Unusable)>) -> Option<T> {
+        read.unwrap_or_else(|(path, why)| {
+            if !self.quiet {
+                eprintln!("warning: {} {why}: computing the field anew", path.display());
             }
-        }
+            None
+        })
     }
 }
 

@@ -17,19 +17,42 @@ pub(crate) struct FieldKeys {
     pub panels: Option<Count>,
     /// No more panels than this; left out: 8000 (0.5 GB).
     pub max_panels: Option<Count>,
-    /// How the boundary condition is tested; left out: "galerkin".
+    /// What solves for the charges; left out: "auto".
+    pub solver: Option<Solver>,
+    /// What the charges sit on and how the boundary condition is imposed on them; left out: "auto".
     pub method: Option<Method>,
 }
 
-/// How the boundary condition is tested.
+/// What solves for the charges.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Solver {
+    /// Chosen from the electrodes and the accuracy.
+    #[default]
+    Auto,
+    /// The whole matrix, factorised: any electrodes, up to some thousand panels.
+    Dense,
+    /// The whole matrix, reduced by the mirrors and rotations that the electrodes have in common.
+    Symmetric,
+    /// Charge along the generating curves of electrodes that are round about one axis.
+    Axisymmetric,
+    /// Without a matrix, far panels together: many panels.
+    Multipole,
+}
+
+/// What the charges sit on and how the boundary condition is imposed on them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// On average over each panel: more exact for the same number of panels.
+    /// Chosen from the electrodes and the accuracy.
     #[default]
+    Auto,
+    /// Constant charge on flat triangles, the condition on average over each: more exact for the same number of panels.
     Galerkin,
-    /// At the centre of each panel: faster to set up.
+    /// Constant charge on flat triangles, the condition at the centre of each: faster to set up.
     Collocation,
+    /// Charge of high order on the true surface: the most exact; not for meshes from files.
+    Curved,
 }
 
 /// `[table]`

@@ -60,8 +60,14 @@ pub struct SolveSummary {
     pub panels: usize,
     /// Unknowns of the linear system.
     pub unknowns: usize,
-    /// How it was solved.
-    pub solver: String,
+    /// What solved it: `dense`, `symmetric`, `axisymmetric`, `multipole`, or `none` where there are no electrodes.
+    pub solver: &'static str,
+    /// `solved` now, or `kept` from an earlier command.
+    pub solution: &'static str,
+    /// Why that solver, in a sentence.
+    pub solver_reason: String,
+    /// What the charges sit on: `galerkin`, `collocation` or `curved`.
+    pub elements: &'static str,
     /// Estimated relative error of field and capacitances.
     pub error_estimate: f64,
     /// What the estimate is from.
@@ -186,18 +192,16 @@ impl SolveSummary {
             let induced: f64 = basis.induced[e].iter().zip(&strengths[electrodes..]).map(|(q, s)| q * s).sum();
             own + induced
         };
-        let solver = match (electrodes, case.field.method) {
-            (0, _) => "closed form".to_owned(),
-            (_, crate::case::Method::Galerkin) => "Galerkin, constant charge, dense Cholesky".to_owned(),
-            (_, crate::case::Method::Collocation) => "collocation, constant charge, dense LU".to_owned(),
-        };
         Self {
             electrodes: case.electrodes.iter().map(|e| e.name.clone()).collect(),
             capacitance_matrix_farad: matrix.clone(),
             capacitance_asymmetry: basis.capacitance.asymmetry,
             panels: basis.panels.len(),
             unknowns: basis.report.unknowns,
-            solver,
+            solver: if electrodes == 0 { "none" } else { solution.choice.solver.name() },
+            solution: if solution.kept { "kept" } else { "solved" },
+            solver_reason: solution.choice.why.clone(),
+            elements: solution.choice.elements.name(),
             error_estimate: solution.error_estimate,
             error_estimated_by: solution.estimated_by.clone(),
             residual: basis.report.residual,
@@ -308,6 +312,7 @@ impl Summary {
         if let Some(solve) = self.solve.as_ref().filter(|s| s.panels > 0) {
             let names = solve.electrodes.join(", ");
             line("electrodes", format!("{names}: {} panels, error about {:.0e}", solve.panels, solve.error_estimate));
+            line("solver", format!("{}, {}: {}", solve.solver, solve.elements, solve.solver_reason));
             for (number, row) in capacitances(case, solve).into_iter().enumerate() {
                 line(if number == 0 { "capacitance" } else { "" }, row);
             }

@@ -4,6 +4,7 @@ use field::{ElectrodeBasis, Grid, PotentialTable, Source};
 use meshes::{SurfaceMesh, SurfaceTree};
 use tracer::{Ensemble, Region};
 
+use super::choice::{Choice, choose};
 use super::surface::{Electrodes, check_contacts};
 use super::{Failure, Reporter, drives, flights, memory, region};
 use crate::CaseSource;
@@ -18,6 +19,8 @@ pub struct Ready {
     pub mesh: SurfaceMesh,
     /// Closed-form sources at strength one.
     pub sources: Vec<Source>,
+    /// What will solve for the charges.
+    pub choice: Choice,
     /// Grains as they start; none where nothing is traced.
     pub ensemble: Ensemble,
 }
@@ -25,10 +28,11 @@ pub struct Ready {
 /// Meshes the electrodes once, draws the grains, and checks that they can stand and start as they do.
 ///
 /// # Errors
-/// Electrodes that touch at different voltages, shapes or mesh files that cannot be, grains that start inside a conductor,
+/// A solver that does not suit the electrodes, electrodes that touch at different voltages, shapes or mesh files that cannot be, grains that start inside a conductor,
 /// a table that fits in no memory.
 pub fn ready(case: &Case, source: &CaseSource, reporter: &dyn Reporter) -> Result<Ready, Failure> {
     reporter.stage("mesh");
+    let choice = choose(case, source)?;
     let sources = drives::sources(case, source)?;
     let mut electrodes = Electrodes::new(case, source, reporter)?;
     let mesh = electrodes.mesh(case, source, 1.0, 1.0)?;
@@ -44,7 +48,7 @@ pub fn ready(case: &Case, source: &CaseSource, reporter: &dyn Reporter) -> Resul
     let bounds = flight_region(case, &mesh);
     check_starts(case, source, &ensemble, &tree, &sources, &bounds)?;
     check_apart(case, source, &ensemble)?;
-    Ok(Ready { electrodes, mesh, sources, ensemble })
+    Ok(Ready { electrodes, mesh, sources, choice, ensemble })
 }
 
 /// Refuses grains that repel each other and start in one place: the force between them has no direction and no end.

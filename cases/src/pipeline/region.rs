@@ -31,8 +31,8 @@ impl Hull {
     }
 }
 
-/// Everything that has a place: electrodes, sources with a size, starting grains.
-fn hull(case: &Case, mesh: &SurfaceMesh) -> Hull {
+/// Everything that makes the field and has a place: electrodes, sources with a size.
+fn makers(case: &Case, mesh: &SurfaceMesh) -> Hull {
     let mut hull = Hull(None);
     if let Some((lo, hi)) = mesh.bounds() {
         hull = hull.with(&lo).with(&hi);
@@ -48,6 +48,12 @@ fn hull(case: &Case, mesh: &SurfaceMesh) -> Hull {
         let center = source.placement.center;
         hull = hull.with(&(center - Vec3::repeat(reach))).with(&(center + Vec3::repeat(reach)));
     }
+    hull
+}
+
+/// The same with the starting grains.
+fn hull(case: &Case, mesh: &SurfaceMesh) -> Hull {
+    let mut hull = makers(case, mesh);
     for group in &case.grains {
         let (center, reach) = match &group.place {
             Place::Points(points) => {
@@ -77,6 +83,15 @@ pub fn table_box(case: &Case, mesh: &SurfaceMesh) -> Region {
     case.table
         .region
         .or_else(|| hull(case, mesh).grown(MARGIN))
+        .unwrap_or(Region { min: Vec3::repeat(-1.0), max: Vec3::repeat(1.0) })
+}
+
+/// Where the field is to be as exact as the case asks: the table's box if the case gives one, else one round electrodes and
+/// sources. Grains have no part in it, so that a solution serves all of them.
+pub fn trap_box(case: &Case, mesh: &SurfaceMesh) -> Region {
+    case.table
+        .region
+        .or_else(|| makers(case, mesh).grown(MARGIN))
         .unwrap_or(Region { min: Vec3::repeat(-1.0), max: Vec3::repeat(1.0) })
 }
 

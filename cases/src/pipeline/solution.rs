@@ -5,27 +5,38 @@ use std::time::Instant;
 use field::influence::Testing;
 use field::{BasisField, BoundaryProblem, ElectrodeBasis, Samples, SolveError, Source};
 use meshes::{SurfaceMesh, Vec3};
+use serde::{Deserialize, Serialize};
 
+use super::choice::{Choice, Elements};
 use super::ready::Ready;
 use super::surface::Electrodes;
 use super::{Failure, Reporter, memory, region};
 use crate::CaseSource;
-use crate::case::{Case, Method};
+use crate::case::Case;
 
-/// A solved case.
-#[derive(Clone, Debug)]
+/// A solved case. What is stored of it is the same whenever the case is.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Solution {
     /// The unit solutions, with their mesh.
     pub basis: ElectrodeBasis,
+    /// What solved for its charges, and why that.
+    pub choice: Choice,
     /// Estimated relative error: the larger of those of the capacitance matrix (against its largest entry) and of the unit
     /// fields at points in the trap region (against the strongest of each), between two meshes.
     pub error_estimate: f64,
     /// How the estimate was found.
     pub estimated_by: String,
-    /// Time spent meshing, s.
+    /// What was warned of on the way.
+    pub warnings: Vec<String>,
+    /// Time spent meshing, s; none for what was kept.
+    #[serde(skip)]
     pub mesh_seconds: f64,
-    /// Time spent solving, all meshes together, s.
+    /// Time spent solving, all meshes together, s; none for what was kept.
+    #[serde(skip)]
     pub solve_seconds: f64,
+    /// It was not computed now: an earlier run kept it.
+    #[serde(skip)]
+    pub kept: bool,
 }
 
 /// Fineness to begin with for an accuracy: with 1 errors are about 1.5e-3, and they fall with the square.
@@ -48,15 +59,7 @@ const ROUNDS: usize = 5;
 /// # Errors
 /// A geometry that cannot be, work that does not fit in memory, equations that cannot be solved.
 pub fn solve(case: &Case, source: &CaseSource, ready: &Ready, reporter: &dyn Reporter) -> Result<Solution, Failure> {
-    let mut work = Work {
-        case,
-        source,
-        reporter,
-        sources: &ready.sources,
-        electrodes: &ready.electrodes,
-        mesh_seconds: 0.0,
-        solve_seconds: 0.0,
-    };
+    let mut work = Work::new(case, source, ready, reporter);
     if case.electrodes.is_empty() {
         let basis = work.solve(&ready.mesh, false)?;
         return Ok(work.done(basis, 0.0, "closed form"));
@@ -100,15 +103,7 @@ pub fn solve(case: &Case, source: &CaseSource, ready: &Ready, reporter: &dyn Rep
 /// # Errors
 /// A shape that cannot be.
 pub fn starting_mesh(case: &Case, source: &CaseSource, ready: &Ready) -> Result<SurfaceMesh, Failure> {
-    let mut work = Work {
-        case,
-        source,
-        reporter: &super::Silent,
-        sources: &ready.sources,
-        electrodes: &ready.electrodes,
-        mesh_seconds: 0.0,
-        solve_seconds: 0.0,
-    };
+    let mut work = Work::new(case, source, ready, &super::Silent);
     Ok(work.starting_mesh()?.0)
 }
 
@@ -123,11 +118,32 @@ struct Work<'a> {
     reporter: &'a dyn Reporter,
     sources: &'a [Source],
     electrodes: &'a Electrodes,
+    choice: &'a Choice,
+    warnings: Vec<String>,
     mesh_seconds: f64,
     solve_seconds: f64,
 }
 
-impl Work<'_> {
+impl<'a> Work<'a> {
+    fn new(case: &'a Case, source: &'a CaseSource, ready: &'a Ready, reporter: &'a dyn Reporter) -> Self {
+        Self {
+            case,
+            source,
+            reporter,
+            sources: &ready.sources,
+            electrodes: &ready.electrodes,
+            choice: &ready.choice,
+            warnings: Vec::new(),
+            mesh_seconds: 0.0,
+            solve_seconds: 0.0,
+        }
+    }
+
+    fn warn(&mut self, text: String) {
+        self.reporter.warning(&text);
+        self.warnings.push(text);
+    }
+
     fn mesh(&mut self, fineness: f64, share: f64) -> Result<SurfaceMesh, Failure> {
         let start = Instant::now();
         let mesh = self.electrodes.mesh(self.case, self.source, fineness, share)?;
@@ -151,9 +167,10 @@ impl Work<'_> {
 
     fn solve(&mut self, mesh: &SurfaceMesh, with_coarse: bool) -> Result<ElectrodeBasis, Failure> {
         let start = Instant::now();
-        let testing = match self.case.field.method {
-            Method::Galerkin => Testing::Galerkin,
-            Method::Collocation => Testing::Collocation,
+        let testing = match self.choice.elements {
+            Elements::Galerkin => Testing::Galerkin,
+            Elements::Collocation => Testing::Collocation,
+            Elements::Curved => unreachable!("refused by `choose` until it is connected here"),
         };
         let problem = BoundaryProblem { mesh, sources: self.sources, testing, with_coarse };
         let told = problem.solve_telling(&|done| self.reporter.fraction(done));
@@ -267,29 +284,32 @@ impl Work<'_> {
             .fold(0.0, f64::max)
     }
 
-    fn warn_if_missed(&self, error: f64, panels: usize) {
+    fn warn_if_missed(&mut self, error: f64, panels: usize) {
         let asked = self.case.field.accuracy;
         // An error that is no number has not met what was asked.
         let met = error <= 1.05 * asked;
         if !met && self.case.field.panels.is_none() {
-            self.reporter.warning(&format!(
+            self.warn(format!(
                 "the field has an estimated error of {error:.1e} with {panels} panels; {asked:.0e} was asked. Raise field.max_panels (now {}) to come nearer",
                 self.case.field.max_panels
             ));
         }
     }
 
-    fn done(&self, basis: ElectrodeBasis, error_estimate: f64, estimated_by: &str) -> Solution {
+    fn done(mut self, basis: ElectrodeBasis, error_estimate: f64, estimated_by: &str) -> Solution {
         let tolerance = error_estimate.max(1e-12);
         for defect in basis.capacitance.defects(tolerance) {
-            self.reporter.warning(&format!("the capacitance matrix is not what it must be: {defect}"));
+            self.warn(format!("the capacitance matrix is not what it must be: {defect}"));
         }
         Solution {
             basis,
+            choice: self.choice.clone(),
             error_estimate,
             estimated_by: estimated_by.to_owned(),
+            warnings: self.warnings,
             mesh_seconds: self.mesh_seconds,
             solve_seconds: self.solve_seconds,
+            kept: false,
         }
     }
 }
@@ -302,7 +322,7 @@ fn matrix_difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
 
 /// Points spread over the trap region, clear of conductors: a tenth of the box where there is room for that.
 fn trap_points(case: &Case, basis: &ElectrodeBasis) -> Vec<Vec3> {
-    let region = region::table_box(case, &basis.mesh);
+    let region = region::trap_box(case, &basis.mesh);
     let field = basis.panel_sum();
     let size = region.max - region.min;
     // The sequence of Roberts (2018) in three dimensions: even coverage, always the same.

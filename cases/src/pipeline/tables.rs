@@ -2,9 +2,10 @@
 
 use std::time::Instant;
 
-use field::{ElectrodeBasis, PotentialTable, TableError, TableOptions, TableReport, tabulate_around};
+use field::{ElectrodeBasis, PotentialTable, TableError, TableOptions, TableReport, starting_spacing, tabulate_from};
 
 use meshes::Vec3;
+use serde::{Deserialize, Serialize};
 use tracer::{Ensemble, Group, Launch, Place};
 
 use super::ready::{table_memory, table_too_large};
@@ -12,15 +13,65 @@ use super::{Failure, Reporter, region};
 use crate::CaseSource;
 use crate::case::Case;
 
-/// A table and how long it took.
-#[derive(Clone, Debug)]
+/// A table and how long it took. What is stored of it is the same whenever its [`Plan`] is.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Tabulated {
     /// The unit potentials.
     pub table: PotentialTable,
     /// What it is like.
     pub report: TableReport,
-    /// s.
+    /// s; none for what was kept.
+    #[serde(skip)]
     pub seconds: f64,
+    /// It was not made now: an earlier run kept it.
+    #[serde(skip)]
+    pub kept: bool,
+}
+
+impl Tabulated {
+    /// Tells when the table is not as exact as asked.
+    pub fn warn_if_missed(&self, case: &Case, reporter: &dyn Reporter) {
+        if self.report.error() > case.table.accuracy {
+            reporter.warning(&format!(
+                "the table has an error of {:.1e}; {:.0e} was asked. Give it more memory (table.max_memory) or a smaller spacing",
+                self.report.error(),
+                case.table.accuracy
+            ));
+        }
+    }
+}
+
+/// All that a table depends on besides the solution.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Its box, accuracy and spacing, and the memory it may take.
+    pub options: TableOptions,
+    /// The spacing to begin with, m. Grains have a part in the table through this and the box, and no other.
+    pub first_spacing: f64,
+}
+
+impl Plan {
+    /// What the table of a case will be.
+    ///
+    /// # Errors
+    /// The table asked for does not fit in memory.
+    pub fn new(case: &Case, source: &CaseSource, basis: &ElectrodeBasis) -> Result<Self, Failure> {
+        let bounds = region::table_box(case, &basis.mesh);
+        let options = TableOptions {
+            min: bounds.min,
+            max: bounds.max,
+            accuracy: case.table.accuracy,
+            spacing: case.table.spacing,
+            max_bytes: table_memory(case),
+        };
+        let first_spacing = starting_spacing(basis, &options, &starts(case)).map_err(|e| too_large(case, source, e))?;
+        Ok(Self { options, first_spacing })
+    }
+}
+
+fn too_large(case: &Case, source: &CaseSource, error: TableError) -> Failure {
+    let TableError::TooLarge { nodes, functions, needed, available, spacing_that_fits } = error;
+    table_too_large(case, source, nodes, functions, needed, available, spacing_that_fits)
 }
 
 /// Tabulates the unit potentials of a case.
@@ -31,31 +82,16 @@ pub fn table(
     case: &Case,
     source: &CaseSource,
     basis: &ElectrodeBasis,
+    plan: &Plan,
     reporter: &dyn Reporter,
 ) -> Result<Tabulated, Failure> {
     reporter.stage("table");
     let start = Instant::now();
-    let bounds = region::table_box(case, &basis.mesh);
-    let options = TableOptions {
-        min: bounds.min,
-        max: bounds.max,
-        accuracy: case.table.accuracy,
-        spacing: case.table.spacing,
-        max_bytes: table_memory(case),
-    };
-    let (table, report) =
-        tabulate_around(basis, &options, &starts(case), &|done| reporter.fraction(done)).map_err(|error| {
-            let TableError::TooLarge { nodes, functions, needed, available, spacing_that_fits } = error;
-            table_too_large(case, source, nodes, functions, needed, available, spacing_that_fits)
-        })?;
-    if report.error() > case.table.accuracy {
-        reporter.warning(&format!(
-            "the table has an error of {:.1e}; {:.0e} was asked. Give it more memory (table.max_memory) or a smaller spacing",
-            report.error(),
-            case.table.accuracy
-        ));
-    }
-    Ok(Tabulated { table, report, seconds: start.elapsed().as_secs_f64() })
+    let (table, report) = tabulate_from(basis, &plan.options, plan.first_spacing, &|done| reporter.fraction(done))
+        .map_err(|error| too_large(case, source, error))?;
+    let tabulated = Tabulated { table, report, seconds: start.elapsed().as_secs_f64(), kept: false };
+    tabulated.warn_if_missed(case, reporter);
+    Ok(tabulated)
 }
 
 /// Grains drawn from each group to see where they start.

@@ -27,7 +27,13 @@ pub(super) fn field(at: &At, keys: &FieldKeys) -> Result<FieldSettings, CaseErro
         return Err(at.key("panels").error(problem, "raise `max_panels`, or ask for fewer"));
     }
     let accuracy = keys.accuracy.map_or(FIELD_ACCURACY, |accuracy| accuracy.value);
-    Ok(FieldSettings { accuracy, panels, max_panels, method: keys.method.unwrap_or_default() })
+    Ok(FieldSettings {
+        accuracy,
+        panels,
+        max_panels,
+        solver: keys.solver.unwrap_or_default(),
+        method: keys.method.unwrap_or_default(),
+    })
 }
 
 pub(super) fn table(at: &At, keys: &TableKeys, field: &FieldSettings) -> Result<TableSettings, CaseError> {

@@ -15,7 +15,8 @@ fn earlier(scratch: &Scratch) -> String {
     for part in ["grains", "cache"] {
         fs::create_dir_all(Path::new(&out).join(part)).unwrap();
     }
-    for name in ["summary.json", "electrodes.vtu", "trajectories.csv", "grains/grains_00000.vtp", "cache/fields.bin"] {
+    for name in ["summary.json", "electrodes.vtu", "trajectories.csv", "grains/grains_00000.vtp", "cache/solution.bin"]
+    {
         fs::write(Path::new(&out).join(name), format!("the earlier {name}")).unwrap();
     }
     out

@@ -27,7 +27,7 @@ const MOMENTS: [Moment; 11] = [
     Moment::After(0.6),
     Moment::After(0.8),
     Moment::At(".electrodes.vtu.partial"),
-    Moment::At("cache/.fields.bin.partial"),
+    Moment::At("cache/.solution.bin.partial"),
     Moment::At(".trajectories.csv.partial"),
     Moment::At("grains/.grains_00020.vtp.partial"),
     Moment::At(".coordinates.png.partial"),
@@ -45,7 +45,7 @@ type Files = BTreeMap<String, Vec<u8>>;
 /// A run with the changed voltage, under way.
 fn start(out: &str) -> Child {
     let tiny = tiny();
-    let mut run = command(Path::new(out), &["run", &tiny, "-o", out, "--set", CHANGE]);
+    let mut run = command(Path::new(out), &["run", &tiny, "-o", out, "--fresh", "--set", CHANGE]);
     run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 

@@ -1,9 +1,10 @@
 //! A uniform grid of cells over a box.
 
 use meshes::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// Cells of one size that fill a box.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
     /// Lower corner, m.
     pub min: Vec3,

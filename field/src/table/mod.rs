@@ -12,16 +12,17 @@ mod tabulate;
 use std::sync::Arc;
 
 use meshes::Vec3;
+use serde::{Deserialize, Serialize};
 
 pub use grid::Grid;
 pub use hermite::PER_NODE;
-pub use tabulate::{TableError, TableOptions, TableReport, tabulate, tabulate_around};
+pub use tabulate::{TableError, TableOptions, TableReport, starting_spacing, tabulate, tabulate_around, tabulate_from};
 
 use crate::panel_sum::PanelSum;
 use crate::{BasisField, ElectrodeBasis, Samples};
 
 /// Potentials of channels on a grid.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PotentialTable {
     /// The grid.
     pub grid: Grid,
@@ -35,6 +36,16 @@ pub struct PotentialTable {
 }
 
 impl PotentialTable {
+    /// Whether there are as many numbers as the grid has nodes and cells; a table that was read from somewhere may lie.
+    pub fn is_whole(&self) -> bool {
+        let product = |counts: [usize; 3]| counts.into_iter().try_fold(1_usize, usize::checked_mul);
+        let nodes = self.grid.cells.iter().all(|c| *c < usize::MAX).then(|| self.grid.cells.map(|c| c + 1));
+        let numbers = nodes.and_then(product).and_then(|n| n.checked_mul(self.channels)?.checked_mul(PER_NODE));
+        self.grid.cells.iter().all(|c| *c > 0)
+            && numbers == Some(self.nodes.len())
+            && product(self.grid.cells) == Some(self.tabulated.len())
+    }
+
     /// Bytes of the table.
     pub fn bytes(&self) -> u64 {
         Self::bytes_for(self.grid.nodes(), self.channels)

@@ -2,6 +2,7 @@
 
 use meshes::{SurfaceTree, Vec3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::fill::fill;
 use super::{Grid, PotentialTable};
@@ -45,7 +46,7 @@ pub enum TableError {
 }
 
 /// What a table is like.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TableReport {
     /// Number of nodes.
     pub nodes: usize,
@@ -129,13 +130,24 @@ pub fn tabulate_around(
     interest: &[Vec3],
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<(PotentialTable, TableReport), TableError> {
+    tabulate_from(basis, options, starting_spacing(basis, options, interest)?, progress)
+}
+
+/// Nodes of a grid of that spacing, and bytes to fill it.
+fn bytes_for(options: &TableOptions, functions: usize, spacing: f64) -> (usize, u64) {
+    let nodes = Grid::new(options.min, options.max, spacing).nodes();
+    (nodes, PotentialTable::bytes_while_filling(nodes, functions))
+}
+
+/// The spacing that [`tabulate_around`] begins with, m: all that its table knows of the points of interest.
+///
+/// # Errors
+/// As [`tabulate`].
+pub fn starting_spacing(basis: &ElectrodeBasis, options: &TableOptions, interest: &[Vec3]) -> Result<f64, TableError> {
     let functions = basis.functions();
     let longest = (options.max - options.min).max();
-    let bytes = |spacing: f64| {
-        let nodes = Grid::new(options.min, options.max, spacing).nodes();
-        (nodes, PotentialTable::bytes_while_filling(nodes, functions))
-    };
-    let mut spacing = options.spacing.unwrap_or(longest / FIRST_CELLS);
+    let bytes = |spacing: f64| bytes_for(options, functions, spacing);
+    let spacing = options.spacing.unwrap_or(longest / FIRST_CELLS);
     let (nodes, needed) = bytes(spacing);
     if needed > options.max_bytes {
         let mut fits = spacing;
@@ -150,11 +162,25 @@ pub fn tabulate_around(
             spacing_that_fits: fits,
         });
     }
-    let exact = basis.panel_sum();
-    if options.spacing.is_none() {
-        let fits = |spacing: f64| bytes(spacing).1 <= options.max_bytes;
-        spacing = wide_spacing(options, spacing, functions, interest, exact.tree(), fits);
+    if options.spacing.is_some() {
+        return Ok(spacing);
     }
+    let fits = |spacing: f64| bytes(spacing).1 <= options.max_bytes;
+    Ok(wide_spacing(options, spacing, functions, interest, &SurfaceTree::new(&basis.mesh), fits))
+}
+
+/// As [`tabulate`], beginning with a spacing (m) that [`starting_spacing`] gave.
+///
+/// # Errors
+/// As [`tabulate`].
+pub fn tabulate_from(
+    basis: &ElectrodeBasis,
+    options: &TableOptions,
+    mut spacing: f64,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<(PotentialTable, TableReport), TableError> {
+    let functions = basis.functions();
+    let exact = basis.panel_sum();
     loop {
         let grid = Grid::new(options.min, options.max, spacing);
         let clearance = clearances(&grid, exact.tree());
@@ -180,7 +206,7 @@ pub fn tabulate_around(
         // The error of the field falls with the fifth power of the spacing; a fifth to two fifths less at a time.
         let wanted = (options.accuracy / report.error().max(f64::MIN_POSITIVE)).powf(0.2);
         let next = spacing * wanted.clamp(0.6, 0.8);
-        if good || options.spacing.is_some() || bytes(next).1 > options.max_bytes {
+        if good || options.spacing.is_some() || bytes_for(options, functions, next).1 > options.max_bytes {
             return Ok((table, report));
         }
         spacing = next;
