@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::capacitance::CapacitanceMatrix;
 use crate::coarse::coarse_capacitance;
 use crate::constants::COULOMB;
-use crate::electrode_basis::ElectrodeBasis;
+use crate::electrode_basis::{ElectrodeBasis, SurfaceCharge};
 use crate::influence::{Testing, potential_coefficients_telling};
 use crate::linear_operator::GalerkinOperator;
 use crate::panel::{Panel, quadrature};
@@ -174,6 +174,7 @@ impl<'a> BoundaryProblem<'a> {
             capacitance: CapacitanceMatrix::new(&charges),
             induced,
             coarse,
+            form: SurfaceCharge::Panels,
             charge,
             report: SolveReport {
                 unknowns: mesh.panels(),

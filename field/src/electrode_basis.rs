@@ -9,9 +9,19 @@ use serde::{Deserialize, Serialize};
 use crate::boundary_problem::SolveReport;
 use crate::capacitance::CapacitanceMatrix;
 use crate::coarse::CoarseCapacitance;
+use crate::curved::{CurvedCharge, CurvedSolution};
 use crate::panel::Panel;
 use crate::panel_sum::PanelSum;
 use crate::source::Source;
+
+/// What the charges of a solution are.
+#[derive(Clone, Debug)]
+pub enum SurfaceCharge {
+    /// Constant on each panel.
+    Panels,
+    /// Of high order on the true surface; the panels show it.
+    Curved(Arc<CurvedCharge>),
+}
 
 /// Unit solutions: basis function k is electrode k at 1 V with the others at 0 V; after the electrodes come the sources, each
 /// of strength one with all electrodes at 0 V.
@@ -27,7 +37,10 @@ pub struct ElectrodeBasis {
     pub panels: Vec<Panel>,
     /// Outside fields in closed form.
     pub sources: Vec<Source>,
-    /// Charge of each panel (row) in each basis function (column), C per volt or per unit of source strength.
+    /// What its charges are.
+    pub form: SurfaceCharge,
+    /// Charge of each panel (row) in each basis function (column), C per volt or per unit of source strength. Where the form is
+    /// not panels, density at the middle of the panel times its area.
     pub charge: Mat<f64>,
     /// Charges on electrodes for unit voltages.
     pub capacitance: CapacitanceMatrix,
@@ -56,7 +69,41 @@ impl ElectrodeBasis {
         assert_eq!(charges.len(), rows * columns, "a charge for each panel and basis function");
         let panels = (0..rows).map(|p| Panel::new(mesh.corners(p))).collect();
         let charge = Mat::from_fn(rows, columns, |p, k| charges[k * rows + p]);
-        Self { mesh, panels, sources, charge, capacitance, induced, coarse: None, report }
+        Self { mesh, panels, sources, form: SurfaceCharge::Panels, charge, capacitance, induced, coarse: None, report }
+    }
+
+    /// A solution with curved elements; `mesh` shows it and is what grains strike.
+    pub fn from_curved(mesh: SurfaceMesh, sources: Vec<Source>, solution: CurvedSolution) -> Self {
+        let electrodes = mesh.electrodes.len();
+        let part = |from: usize, to: usize| -> Vec<Vec<f64>> {
+            solution.totals.iter().map(|row| row[from..to].to_vec()).collect()
+        };
+        let capacitance = CapacitanceMatrix::new(&part(0, electrodes));
+        let induced = part(electrodes, electrodes + sources.len());
+        let report = SolveReport {
+            unknowns: solution.unknowns,
+            assembly_seconds: solution.assembly_seconds,
+            solve_seconds: solution.solve_seconds,
+            residual: 0.0,
+            matrix_bytes: solution.matrix_bytes,
+        };
+        Self::shown(mesh, sources, Arc::new(solution.charge), capacitance, induced, report)
+    }
+
+    fn shown(
+        mesh: SurfaceMesh,
+        sources: Vec<Source>,
+        curved: Arc<CurvedCharge>,
+        capacitance: CapacitanceMatrix,
+        induced: Vec<Vec<f64>>,
+        report: SolveReport,
+    ) -> Self {
+        let panels: Vec<Panel> = (0..mesh.panels()).map(|p| Panel::new(mesh.corners(p))).collect();
+        let middles: Vec<_> = panels.iter().zip(&mesh.electrode).map(|(p, e)| (p.centroid, *e as usize)).collect();
+        let (densities, functions) = (curved.densities(&middles), curved.functions);
+        let charge = Mat::from_fn(panels.len(), functions, |p, k| densities[p * functions + k] * panels[p].area);
+        let form = SurfaceCharge::Curved(curved);
+        Self { mesh, panels, sources, form, charge, capacitance, induced, coarse: None, report }
     }
 
     /// The charges of all panels, basis function after basis function, C.
@@ -108,11 +155,16 @@ struct Stored {
 enum StoredCharge {
     /// Constant on each panel, C: basis function after basis function.
     Panels(Vec<f64>),
+    /// Curved elements.
+    Curved(CurvedCharge),
 }
 
 impl From<ElectrodeBasis> for Stored {
     fn from(basis: ElectrodeBasis) -> Self {
-        let charge = StoredCharge::Panels(basis.charges());
+        let charge = match &basis.form {
+            SurfaceCharge::Panels => StoredCharge::Panels(basis.charges()),
+            SurfaceCharge::Curved(charge) => StoredCharge::Curved((**charge).clone()),
+        };
         let ElectrodeBasis { mesh, sources, capacitance, induced, report, .. } = basis;
         Self { mesh, sources, charge, capacitance, induced, report }
     }
@@ -137,6 +189,12 @@ impl TryFrom<Stored> for ElectrodeBasis {
                 Ok(Self::from_charges(mesh, sources, &charges, capacitance, induced, report))
             }
             StoredCharge::Panels(_) => Err("not a charge for each panel and basis function"),
+            StoredCharge::Curved(charge)
+                if charge.is_whole(electrodes) && charge.functions == electrodes + sources.len() =>
+            {
+                Ok(Self::shown(mesh, sources, Arc::new(charge), capacitance, induced, report))
+            }
+            StoredCharge::Curved(_) => Err("charges and elements do not fit together"),
         }
     }
 }

@@ -6,7 +6,8 @@ use meshes::{ElectrodeSurface, SurfaceTree, Vec3};
 use rayon::prelude::*;
 
 use crate::constants::COULOMB;
-use crate::electrode_basis::ElectrodeBasis;
+use crate::curved::CurvedSum;
+use crate::electrode_basis::{ElectrodeBasis, SurfaceCharge};
 use crate::panel_groups::{ON_SURFACE, PanelGroups};
 use crate::source::Source;
 use crate::{BasisField, Samples};
@@ -17,7 +18,7 @@ use crate::{BasisField, Samples};
 /// just outside, on a sheet or a hollow electrode the mean of both sides. Closer to a surface than a panel is wide the field repeats the steps of the
 /// charge from panel to panel.
 pub struct PanelSum {
-    panels: PanelGroups,
+    charges: Charges,
     sources: Vec<Source>,
     /// Weight of each source in each channel: `source * channels + channel`.
     source_weight: Vec<f64>,
@@ -28,6 +29,31 @@ pub struct PanelSum {
     /// Distance within which a point counts as on the surface, m.
     surface_reach: f64,
     channels: usize,
+}
+
+/// Charges in the form in which they are summed.
+enum Charges {
+    Panels(PanelGroups),
+    Curved(CurvedSum),
+}
+
+impl Charges {
+    /// Panels, or points of elements: a measure of the work for one point.
+    fn len(&self) -> usize {
+        match self {
+            Self::Panels(panels) => panels.len(),
+            // A point charge takes a tenth of a panel's time.
+            Self::Curved(elements) => elements.len() / 10,
+        }
+    }
+
+    /// Potential and gradient of every channel at every point, `(point * channels + channel) * 4`.
+    fn sum(&self, points: &[Vec3]) -> Vec<f64> {
+        match self {
+            Self::Panels(panels) => panels.sum(points),
+            Self::Curved(elements) => elements.sum(points),
+        }
+    }
 }
 
 impl PanelSum {
@@ -43,8 +69,12 @@ impl PanelSum {
         let per = |first: usize, count: usize| -> Vec<f64> {
             (first..first + count).flat_map(|k| weights.iter().map(move |row| row[k])).collect()
         };
+        let charges = match &basis.form {
+            SurfaceCharge::Panels => Charges::Panels(PanelGroups::new(&basis.panels, &on_solid, channels, density)),
+            SurfaceCharge::Curved(charge) => Charges::Curved(CurvedSum::new(charge, &weights)),
+        };
         Self {
-            panels: PanelGroups::new(&basis.panels, &on_solid, channels, density),
+            charges,
             sources: basis.sources.clone(),
             source_weight: per(electrodes, basis.sources.len()),
             electrode_potential: per(0, electrodes),
@@ -110,7 +140,7 @@ impl BasisField for PanelSum {
         let some = |points: &[Vec3], potential: &mut [f64], gradient: &mut [Vec3]| {
             let inside: Vec<Option<usize>> = points.iter().map(|point| self.below_surface(point)).collect();
             let outside: Vec<usize> = (0..points.len()).filter(|&p| inside[p].is_none()).collect();
-            let sums = self.panels.sum(&outside.iter().map(|&p| points[p]).collect::<Vec<_>>());
+            let sums = self.charges.sum(&outside.iter().map(|&p| points[p]).collect::<Vec<_>>());
             for (p, sums) in outside.into_iter().zip(sums.chunks_exact(4 * n)) {
                 let (potential, gradient) = (&mut potential[p * n..(p + 1) * n], &mut gradient[p * n..(p + 1) * n]);
                 for (c, sum) in sums.chunks_exact(4).enumerate() {
@@ -124,7 +154,7 @@ impl BasisField for PanelSum {
                 potential[p * n..(p + 1) * n].copy_from_slice(own);
             }
         };
-        if points.len() > 1 && points.len() * self.panels.len() >= WORTH_SHARING {
+        if points.len() > 1 && points.len() * self.charges.len() >= WORTH_SHARING {
             let batch = (points.len() / (4 * rayon::current_num_threads())).clamp(1, BATCH);
             let all = (samples.potential.par_chunks_mut(batch * n), samples.gradient.par_chunks_mut(batch * n));
             points

@@ -3,6 +3,7 @@
 //! What solves with curved elements needs the true surface, not its facets. A shape that is made of bodies of revolution gives
 //! them here in closed form; [`crate::triangulate()`] gives the same surfaces as triangles.
 
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::lattice::wires_along;
@@ -10,7 +11,7 @@ use crate::triangulate::CLEARANCE;
 use crate::{GridPattern, Shape, Vec3, Weave};
 
 /// A smooth piece of a generating curve: points (distance from the axis, height), m, for a parameter from 0 to 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Curve {
     /// A straight line.
     Line {

@@ -1,5 +1,6 @@
 //! The charge that curved elements carry.
 
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 use faer::Mat;
@@ -11,9 +12,10 @@ use super::legendre::{MAX_ORDER, Transform, legendre};
 use crate::constants::COULOMB;
 
 /// Charges on a curved mesh, for each basis function.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CurvedCharge {
     /// The elements.
+    #[serde(with = "shared")]
     pub mesh: Arc<CurvedMesh>,
     /// Charge per parameter at every point, over Coulomb's constant (V m): `function * points + point`.
     pub values: Vec<f64>,
@@ -28,6 +30,16 @@ impl CurvedCharge {
     pub fn new(mesh: CurvedMesh, values: &Mat<f64>, accuracy: f64) -> Self {
         let columns = values.col_iter().flat_map(|c| c.iter().copied().collect::<Vec<_>>()).collect();
         Self { mesh: Arc::new(mesh), values: columns, functions: values.ncols(), accuracy }
+    }
+
+    /// Whether numbers fit together; a charge that was read from somewhere may lie.
+    pub fn is_whole(&self, electrodes: usize) -> bool {
+        let mesh = &*self.mesh;
+        let orders = (1..=MAX_ORDER).contains(&mesh.order);
+        let owned =
+            mesh.electrode.len() == mesh.patches.len() && mesh.electrode.iter().all(|e| (*e as usize) < electrodes);
+        let cut = mesh.elements.iter().all(|e| (e.patch as usize) < mesh.patches.len());
+        orders && owned && cut && mesh.unknowns().checked_mul(self.functions) == Some(self.values.len())
     }
 
     /// Values at the points of an element for one function.
@@ -98,5 +110,22 @@ impl CurvedCharge {
             }
         }
         densities
+    }
+}
+
+/// A mesh that is shared is stored as it is.
+mod shared {
+    use std::sync::Arc;
+
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use super::CurvedMesh;
+
+    pub fn serialize<S: Serializer>(mesh: &Arc<CurvedMesh>, to: S) -> Result<S::Ok, S::Error> {
+        (**mesh).serialize(to)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Arc<CurvedMesh>, D::Error> {
+        CurvedMesh::deserialize(from).map(Arc::new)
     }
 }

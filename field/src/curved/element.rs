@@ -1,11 +1,12 @@
 //! The elements that a surface is cut into.
 
 use meshes::{Patch, Vec3};
+use serde::{Deserialize, Serialize};
 
 use super::legendre::gauss;
 
 /// A rectangle in the parameters of a patch.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Element {
     /// Which patch.
     pub patch: u32,
@@ -67,7 +68,7 @@ impl Ball {
 }
 
 /// A surface cut into elements of one order.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CurvedMesh {
     /// The patches of all electrodes.
     pub patches: Vec<Patch>,

@@ -14,6 +14,7 @@ mod charge;
 mod element;
 mod kernel;
 mod legendre;
+mod pieces;
 mod refine;
 mod solve;
 mod sum;
@@ -21,6 +22,7 @@ mod symmetry;
 
 pub use charge::CurvedCharge;
 pub use element::{CurvedMesh, Element};
+pub(crate) use pieces::CurvedPieces;
 pub use refine::{Refined, solve_to};
 pub use solve::{CurvedProblem, CurvedSolution};
 pub(crate) use sum::CurvedSum;

@@ -45,7 +45,7 @@ impl Level {
 const ROUNDS: usize = 9;
 
 /// Solves on finer and finer meshes until the error of one is known to be below `accuracy`. `difference(fine, coarse)` is the
-/// relative error of the second if the first were exact. `limit` is the largest number of unknowns of a sector.
+/// relative error of the second if the first were exact; `begins` hears of each mesh before it is solved. `limit` is the largest number of unknowns of a sector.
 ///
 /// # Errors
 /// As [`CurvedProblem::solve`].
@@ -56,7 +56,8 @@ pub fn solve_to(
     accuracy: f64,
     limit: usize,
     difference: &dyn Fn(&CurvedSolution, &CurvedSolution) -> f64,
-    progress: &(dyn Fn(&CurvedMesh, f64) + Sync),
+    begins: &dyn Fn(&CurvedMesh),
+    progress: &(dyn Fn(f64) + Sync),
 ) -> Result<Refined, SolveError> {
     let electrodes = electrode.iter().map(|e| *e as usize + 1).max().unwrap_or(0);
     let vertices = vertices(patches, electrode);
@@ -73,24 +74,25 @@ pub fn solve_to(
     let mut before: Option<CurvedSolution> = None;
     for round in 1.. {
         // Integrals to a hundredth of what is asked.
-        let solution = problem.solve(&mesh, 0.01 * accuracy, &|f| progress(&mesh, f))?;
-        let mut missed = false;
+        begins(&mesh);
+        let solution = problem.solve(&mesh, 0.01 * accuracy, progress)?;
+        let mut known = None;
         if let Some(coarse) = before {
             let error = TRUST * difference(&solution, &coarse);
             if error <= accuracy {
                 return Ok(Refined { solution: coarse, error, judged_by: solution.unknowns });
             }
-            missed = true;
+            known = Some(error);
             if round == ROUNDS {
                 return Ok(Refined { solution, error, judged_by: 0 });
             }
         }
         level = level.next();
-        let elements = graded(patches, &vertices, refined(&solution, accuracy, missed), level.depth);
+        let elements = graded(patches, &vertices, refined(&solution, accuracy, known.is_some()), level.depth);
         let finer = CurvedMesh { elements, order: level.order, ..mesh };
-        if finer.unknowns() / solution.symmetry > limit && missed {
+        if let Some(error) = known.filter(|_| finer.unknowns() / solution.symmetry > limit) {
             // Nothing better can be had: the error of the coarser one bounds that of the better.
-            return Ok(Refined { solution, error: f64::NAN, judged_by: 0 });
+            return Ok(Refined { solution, error, judged_by: 0 });
         }
         mesh = finer;
         before = Some(solution);

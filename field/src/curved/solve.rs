@@ -1,15 +1,20 @@
 //! Solving for the charge of a curved mesh.
 
+use std::sync::Arc;
+
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting as lu;
 use faer::{Mat, Par};
 use meshes::Vec3;
+use rayon::prelude::*;
 
 use super::assembly::Assembly;
 use super::charge::CurvedCharge;
 use super::element::CurvedMesh;
 use super::legendre::gauss;
+use super::sum::CurvedSum;
 use super::symmetry::Symmetry;
+use crate::Samples;
 use crate::boundary_problem::SolveError;
 use crate::constants::COULOMB;
 use crate::source::Source;
@@ -42,6 +47,23 @@ pub struct CurvedSolution {
     pub assembly_seconds: f64,
     /// Factorising and solving, s.
     pub solve_seconds: f64,
+}
+
+impl CurvedSolution {
+    /// Potentials and gradients of all basis functions at points off the surface, without the sources' own.
+    pub fn sample(&self, points: &[Vec3]) -> Samples {
+        let n = self.charge.functions;
+        let unit = |k: usize| (0..n).map(|l| f64::from(u8::from(k == l))).collect::<Vec<f64>>();
+        let weights: Vec<Arc<[f64]>> = (0..n).map(|k| Arc::from(unit(k))).collect();
+        let field = CurvedSum::new(&self.charge, &weights);
+        let sums: Vec<Vec<f64>> = points.par_chunks(4).map(|some| field.sum(some)).collect();
+        let mut samples = Samples::default();
+        for sum in sums.iter().flat_map(|s| s.chunks_exact(4)) {
+            samples.potential.push(sum[0]);
+            samples.gradient.push(Vec3::new(sum[1], sum[2], sum[3]));
+        }
+        samples
+    }
 }
 
 impl CurvedProblem<'_> {

@@ -10,12 +10,8 @@ fn solved(shape: &Shape, accuracy: f64) -> Refined {
     let problem = CurvedProblem { names: &names, sources: &[], symmetric: true };
     let difference =
         |fine: &CurvedSolution, coarse: &CurvedSolution| (coarse.totals[0][0] / fine.totals[0][0] - 1.0).abs();
-    let said = |mesh: &CurvedMesh, f: f64| {
-        if f == 0.9 {
-            eprint!(" {}^{}", mesh.elements.len(), mesh.order);
-        }
-    };
-    solve_to(&problem, &patches, &electrode, accuracy, 8000, &difference, &said).unwrap()
+    let begins = |mesh: &CurvedMesh| eprint!(" {}^{}", mesh.elements.len(), mesh.order);
+    solve_to(&problem, &patches, &electrode, accuracy, 8000, &difference, &begins, &|_| ()).unwrap()
 }
 
 #[test]

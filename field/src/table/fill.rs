@@ -13,10 +13,9 @@ use rayon::prelude::*;
 use super::grid::Grid;
 use super::hermite::PER_NODE;
 use crate::ElectrodeBasis;
-use crate::constants::COULOMB;
 use crate::gather::Gather;
 use crate::harmonics::{coefficients, derivative_weights, translation};
-use crate::panel::quadrature;
+use crate::pieces::{Piece, Pieces};
 
 /// A panel is far from a box when its nearest point is farther from the centre than this many times the box's radius. Of
 /// an expansion of degree p it leaves out (1/2.2)^(p + 1).
@@ -46,39 +45,11 @@ fn degree_for(accuracy: f64) -> usize {
     (((0.01 * accuracy).ln() / (1.0 / FAR).ln()).ceil() as usize).clamp(8, 20)
 }
 
-/// Part of a panel.
-#[derive(Clone, Copy)]
-struct Piece {
-    corners: [Vec3; 3],
-    centroid: Vec3,
-    /// Largest distance of a corner from the centroid, m.
-    radius: f64,
-    panel: u32,
-    /// Share of the panel's area.
-    share: f64,
-}
-
-impl Piece {
-    fn new(corners: [Vec3; 3], panel: u32, share: f64) -> Self {
-        let centroid = corners.iter().sum::<Vec3>() / 3.0;
-        let radius = corners.iter().map(|c| (c - centroid).norm()).fold(0.0, f64::max);
-        Self { corners, centroid, radius, panel, share }
-    }
-
-    fn quarters(&self) -> [Self; 4] {
-        let [a, b, c] = self.corners;
-        let (ab, bc, ca) = ((a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0);
-        [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]]
-            .map(|corners| Self::new(corners, self.panel, 0.25 * self.share))
-    }
-}
-
 /// What all boxes share.
 struct Filler<'a> {
     grid: Grid,
     needed: &'a [bool],
-    /// Coulomb's constant times the panels' charges: `panel * functions + function`.
-    charge: Vec<f64>,
+    pieces: Pieces<'a>,
     functions: usize,
     /// Asked of the field, relative.
     accuracy: f64,
@@ -124,8 +95,7 @@ pub(super) fn fill(
     let per_node = PER_NODE * functions;
     let mut nodes = vec![0.0; grid.nodes() * per_node];
     let filler = Filler::new(basis, grid, needed, accuracy);
-    let pieces: Vec<Piece> =
-        basis.panels.iter().enumerate().map(|(p, panel)| Piece::new(panel.corners, p as u32, 1.0)).collect();
+    let pieces = filler.pieces.all();
     let mut edge = LEAF;
     while edge < *grid.cells.iter().max().unwrap_or(&LEAF) {
         edge *= 2;
@@ -165,7 +135,7 @@ pub(super) fn fill(
 }
 
 impl<'a> Filler<'a> {
-    fn new(basis: &ElectrodeBasis, grid: Grid, needed: &'a [bool], accuracy: f64) -> Self {
+    fn new(basis: &'a ElectrodeBasis, grid: Grid, needed: &'a [bool], accuracy: f64) -> Self {
         let functions = basis.functions();
         let degree = degree_for(accuracy);
         let n = coefficients(degree);
@@ -202,13 +172,8 @@ impl<'a> Filler<'a> {
             })
             .collect();
         let at_node = (0..PER_NODE).map(|k| derivative_weights(&Vec3::zeros(), NODE_DEGREE, orders(k))).collect();
-        let charge =
-            (0..basis.panels.len()).flat_map(|p| (0..functions).map(move |k| COULOMB * basis.charge[(p, k)])).collect();
-        Self { grid, needed, charge, functions, accuracy, degree, handed_down, derivatives, at_node, arch: Arch::new() }
-    }
-
-    fn charges(&self, panel: u32) -> &[f64] {
-        &self.charge[panel as usize * self.functions..(panel as usize + 1) * self.functions]
+        let pieces = Pieces::new(basis);
+        Self { grid, needed, pieces, functions, accuracy, degree, handed_down, derivatives, at_node, arch: Arch::new() }
     }
 
     /// Adds far panels to the box's expansion and returns the near ones, those as large as the box cut into pieces.
@@ -218,15 +183,15 @@ impl<'a> Filler<'a> {
         let mut left = Vec::new();
         let mut pending = near;
         while let Some(piece) = pending.pop() {
-            let distance = (piece.centroid - center).norm();
+            let distance = (piece.center - center).norm();
             let far = distance - piece.radius > FAR * radius;
             let ratio = piece.radius / (distance - radius).max(f64::MIN_POSITIVE);
             if far && ratio <= LARGEST_PIECE {
-                for (y, weight) in quadrature::rule(rule_degree(ratio, self.accuracy)).on(&piece.corners) {
-                    gather.push(&((y - center) / radius), weight * piece.share / radius, self.charges(piece.panel));
-                }
+                self.pieces.points(&piece, rule_degree(ratio, self.accuracy), &mut |y, charges| {
+                    gather.push(&((y - center) / radius), 1.0 / radius, charges);
+                });
             } else if far || piece.radius > radius {
-                pending.extend(piece.quarters());
+                pending.extend(self.pieces.quarters(&piece));
             } else {
                 left.push(piece);
             }
@@ -307,14 +272,14 @@ impl<'a> Filler<'a> {
         let mut gather = Gather::new(self.functions);
         let mut pending = near.to_vec();
         while let Some(piece) = pending.pop() {
-            let ratio = piece.radius / (piece.centroid - node).norm().max(f64::MIN_POSITIVE);
+            let ratio = piece.radius / (piece.center - node).norm().max(f64::MIN_POSITIVE);
             if ratio > LARGEST_PIECE {
-                pending.extend(piece.quarters());
+                pending.extend(self.pieces.quarters(&piece));
                 continue;
             }
-            for (y, weight) in quadrature::rule(rule_degree(ratio, self.accuracy)).on(&piece.corners) {
-                gather.push(&((y - node) / length), weight * piece.share / length, self.charges(piece.panel));
-            }
+            self.pieces.points(&piece, rule_degree(ratio, self.accuracy), &mut |y, charges| {
+                gather.push(&((y - node) / length), 1.0 / length, charges);
+            });
         }
         let n = coefficients(NODE_DEGREE);
         let mut sums = vec![0.0; n * self.functions];

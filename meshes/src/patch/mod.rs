@@ -5,13 +5,14 @@
 
 mod shapes;
 
+use serde::{Deserialize, Serialize};
 pub use shapes::patches;
 
 use crate::profile::{Curve, Joint};
 use crate::{Placement, ShapeError, Vec3};
 
 /// What stands at one side of a patch.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Side {
     /// The surface goes on smoothly, or the side shrinks to a point of the axis.
     Smooth,
@@ -50,7 +51,7 @@ impl Side {
 }
 
 /// A line or part of a circle in space, for a parameter from 0 to 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Path {
     /// A straight line.
     Line {
@@ -90,7 +91,7 @@ impl Path {
 }
 
 /// The form of a patch: the unit square (u, v) in space.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum PatchForm {
     /// A piece of a generating curve (along u) turned about `e3` from one azimuth to another (along v).
     Revolved {
@@ -174,7 +175,7 @@ impl Warp {
 }
 
 /// A smooth part of a surface. Its parameters (ξ, η) are those of the form, stretched towards sides where charge crowds.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Patch {
     /// Its form.
     pub form: PatchForm,
