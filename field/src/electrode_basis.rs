@@ -11,6 +11,7 @@ use crate::capacitance::CapacitanceMatrix;
 use crate::coarse::CoarseCapacitance;
 use crate::panel::Panel;
 use crate::panel_sum::PanelSum;
+use crate::plane::Plane;
 use crate::source::Source;
 
 /// Unit solutions: basis function k is electrode k at 1 V with the others at 0 V; after the electrodes come the sources, each
@@ -27,6 +28,8 @@ pub struct ElectrodeBasis {
     pub panels: Vec<Panel>,
     /// Outside fields in closed form.
     pub sources: Vec<Source>,
+    /// A grounded plane, with everything above it: every charge and every source has an image of opposite sign.
+    pub ground: Option<Plane>,
     /// Charge of each panel (row) in each basis function (column), C per volt or per unit of source strength.
     pub charge: Mat<f64>,
     /// Charges on electrodes for unit voltages.
@@ -47,6 +50,7 @@ impl ElectrodeBasis {
     pub fn from_charges(
         mesh: SurfaceMesh,
         sources: Vec<Source>,
+        ground: Option<Plane>,
         charges: &[f64],
         capacitance: CapacitanceMatrix,
         induced: Vec<Vec<f64>>,
@@ -56,7 +60,7 @@ impl ElectrodeBasis {
         assert_eq!(charges.len(), rows * columns, "a charge for each panel and basis function");
         let panels = (0..rows).map(|p| Panel::new(mesh.corners(p))).collect();
         let charge = Mat::from_fn(rows, columns, |p, k| charges[k * rows + p]);
-        Self { mesh, panels, sources, charge, capacitance, induced, coarse: None, report }
+        Self { mesh, panels, sources, ground, charge, capacitance, induced, coarse: None, report }
     }
 
     /// The charges of all panels, basis function after basis function, C.
@@ -97,6 +101,7 @@ impl ElectrodeBasis {
 struct Stored {
     mesh: SurfaceMesh,
     sources: Vec<Source>,
+    ground: Option<Plane>,
     charge: StoredCharge,
     capacitance: CapacitanceMatrix,
     induced: Vec<Vec<f64>>,
@@ -113,8 +118,8 @@ enum StoredCharge {
 impl From<ElectrodeBasis> for Stored {
     fn from(basis: ElectrodeBasis) -> Self {
         let charge = StoredCharge::Panels(basis.charges());
-        let ElectrodeBasis { mesh, sources, capacitance, induced, report, .. } = basis;
-        Self { mesh, sources, charge, capacitance, induced, report }
+        let ElectrodeBasis { mesh, sources, ground, capacitance, induced, report, .. } = basis;
+        Self { mesh, sources, ground, charge, capacitance, induced, report }
     }
 }
 
@@ -123,7 +128,7 @@ impl TryFrom<Stored> for ElectrodeBasis {
 
     /// Numbers that do not fit together make no solution.
     fn try_from(stored: Stored) -> Result<Self, Self::Error> {
-        let Stored { mesh, sources, charge, capacitance, induced, report } = stored;
+        let Stored { mesh, sources, ground, charge, capacitance, induced, report } = stored;
         let (panels, electrodes) = (mesh.triangles.len(), mesh.electrodes.len());
         let corners = mesh.triangles.iter().flatten().all(|v| (*v as usize) < mesh.vertices.len());
         let owners = mesh.electrode.len() == panels && mesh.electrode.iter().all(|e| (*e as usize) < electrodes);
@@ -134,7 +139,7 @@ impl TryFrom<Stored> for ElectrodeBasis {
         }
         match charge {
             StoredCharge::Panels(charges) if panels.checked_mul(electrodes + sources.len()) == Some(charges.len()) => {
-                Ok(Self::from_charges(mesh, sources, &charges, capacitance, induced, report))
+                Ok(Self::from_charges(mesh, sources, ground, &charges, capacitance, induced, report))
             }
             StoredCharge::Panels(_) => Err("not a charge for each panel and basis function"),
         }

@@ -67,6 +67,7 @@ pub mod linear_operator;
 pub mod panel;
 mod panel_groups;
 pub mod panel_sum;
+mod plane;
 pub mod source;
 pub mod table;
 pub mod waveform;
@@ -80,6 +81,7 @@ pub use electrode_basis::ElectrodeBasis;
 pub use linear_operator::LinearOperator;
 pub use panel::Panel;
 pub use panel_sum::PanelSum;
+pub use plane::Plane;
 pub use source::{Source, SourceKind};
 pub use table::{
     Grid, PotentialTable, TableError, TableOptions, TableReport, TabulatedField, starting_spacing, tabulate,

@@ -77,7 +77,7 @@ impl Piece {
 struct Filler<'a> {
     grid: Grid,
     needed: &'a [bool],
-    /// Coulomb's constant times the panels' charges: `panel * functions + function`.
+    /// Coulomb's constant times the panels' charges: `panel * functions + function`; above a grounded plane the images follow.
     charge: Vec<f64>,
     functions: usize,
     /// Asked of the field, relative.
@@ -124,8 +124,9 @@ pub(super) fn fill(
     let per_node = PER_NODE * functions;
     let mut nodes = vec![0.0; grid.nodes() * per_node];
     let filler = Filler::new(basis, grid, needed, accuracy);
-    let pieces: Vec<Piece> =
-        basis.panels.iter().enumerate().map(|(p, panel)| Piece::new(panel.corners, p as u32, 1.0)).collect();
+    let images = basis.ground.iter().flat_map(|plane| basis.panels.iter().map(|panel| plane.image_of_panel(panel)));
+    let all = basis.panels.iter().copied().chain(images);
+    let pieces: Vec<Piece> = all.enumerate().map(|(p, panel)| Piece::new(panel.corners, p as u32, 1.0)).collect();
     let mut edge = LEAF;
     while edge < *grid.cells.iter().max().unwrap_or(&LEAF) {
         edge *= 2;
@@ -202,8 +203,12 @@ impl<'a> Filler<'a> {
             })
             .collect();
         let at_node = (0..PER_NODE).map(|k| derivative_weights(&Vec3::zeros(), NODE_DEGREE, orders(k))).collect();
-        let charge =
-            (0..basis.panels.len()).flat_map(|p| (0..functions).map(move |k| COULOMB * basis.charge[(p, k)])).collect();
+        let of_panels = |sign: f64| {
+            (0..basis.panels.len())
+                .flat_map(move |p| (0..functions).map(move |k| sign * COULOMB * basis.charge[(p, k)]))
+        };
+        let images = basis.ground.iter().flat_map(|_| of_panels(-1.0));
+        let charge = of_panels(1.0).chain(images).collect();
         Self { grid, needed, charge, functions, accuracy, degree, handed_down, derivatives, at_node, arch: Arch::new() }
     }
 
