@@ -46,7 +46,7 @@ const BEYOND_A_SCHEMA: &str = "\
     grains_file_short_row grains_names grid_holes_and_wires grid_holes_merge grid_no_outline grid_of_nothing \
     grid_pitch_too_large grid_wire_radius_of_holes grid_wires_touch hyperbola_cut_off integrator_langevin_alone \
     langevin_not_followed drag_of_points mesh_format mesh_missing mesh_unit \
-    name_taken_by_source names_taken opening_half_turn opening_in_degrees region_inside_out ring_too_thick rod_too_short \
+    name_taken_by_source name_of_the_ground ground_without_direction names_taken opening_half_turn opening_in_degrees region_inside_out ring_too_thick rod_too_short \
     samples_backwards samples_missing samples_nan source_caps_in_two_dimensions source_driven_by_volts \
     source_uniform_in_volts sweep_units_differ sweep_unknown_electrode table_inside_out table_spacing up_along_axis \
     wire_point_twice temperature_below_zero opening_zero quantity_trailing sweep_of_nothing \

@@ -6,7 +6,7 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::linalg::lu::partial_pivoting as lu;
 use faer::{Mat, Par};
-use meshes::SurfaceMesh;
+use meshes::{SurfaceMesh, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -14,9 +14,11 @@ use crate::capacitance::CapacitanceMatrix;
 use crate::coarse::coarse_capacitance;
 use crate::constants::COULOMB;
 use crate::electrode_basis::{ElectrodeBasis, SurfaceCharge};
+use crate::influence::galerkin;
 use crate::influence::{Testing, potential_coefficients_telling};
 use crate::linear_operator::GalerkinOperator;
 use crate::panel::{Panel, quadrature};
+use crate::plane::Plane;
 use crate::source::Source;
 
 /// The electrostatic problem of conductors in given outside fields: on each electrode the potential is constant.
@@ -28,6 +30,8 @@ pub struct BoundaryProblem<'a> {
     pub sources: &'a [Source],
     /// How the condition is imposed.
     pub testing: Testing,
+    /// A grounded plane, with all electrodes above it.
+    pub ground: Option<Plane>,
     /// Solve a coarser problem from the same matrix as well, for an error estimate where the surface cannot be meshed anew
     /// (Galerkin testing only).
     pub with_coarse: bool,
@@ -42,6 +46,12 @@ pub enum SolveError {
         /// Which panel.
         panel: usize,
         /// Its electrode.
+        electrode: String,
+    },
+    /// An electrode reaches down to the grounded plane.
+    #[error("electrode `{electrode}` touches or crosses the grounded plane, or stands below it")]
+    OnGround {
+        /// The electrode.
         electrode: String,
     },
     /// A source's field is infinite on an electrode.
@@ -104,7 +114,7 @@ const ASSEMBLY: f64 = 0.8;
 impl<'a> BoundaryProblem<'a> {
     /// The problem of electrodes alone, with Galerkin testing.
     pub fn new(mesh: &'a SurfaceMesh) -> Self {
-        Self { mesh, sources: &[], testing: Testing::Galerkin, with_coarse: false }
+        Self { mesh, sources: &[], testing: Testing::Galerkin, ground: None, with_coarse: false }
     }
 
     /// Bytes that [`BoundaryProblem::solve`] needs at its peak for that many panels and right-hand sides: the matrix, its
@@ -137,10 +147,19 @@ impl<'a> BoundaryProblem<'a> {
         if let Some(panel) = panels.iter().position(|p| !(p.area > 0.0)) {
             return Err(SolveError::Degenerate { panel, electrode: name(panel) });
         }
+        let images: Option<Vec<Panel>> =
+            self.ground.map(|plane| panels.iter().map(|panel| plane.image_of_panel(panel)).collect());
+        #[allow(clippy::neg_cmp_op_on_partial_ord)]
+        if let Some(plane) = &self.ground
+            && let Some(panel) = panels.iter().position(|p| p.corners.iter().any(|c| !(plane.height(c) > 0.0)))
+        {
+            return Err(SolveError::OnGround { electrode: name(panel) });
+        }
         let start = Instant::now();
         let mut charge = self.right_hand_sides(&panels)?;
         let wanted = charge.clone();
-        let mut matrix = potential_coefficients_telling(&panels, self.testing, &|done| progress(ASSEMBLY * done));
+        let told = |done| progress(ASSEMBLY * done);
+        let mut matrix = potential_coefficients_telling(&panels, images.as_deref(), self.testing, &told);
         let assembled = Instant::now();
         let coarse = (self.with_coarse && self.testing == Testing::Galerkin && !panels.is_empty())
             .then(|| coarse_capacitance(mesh, &panels, &matrix))
@@ -152,7 +171,7 @@ impl<'a> BoundaryProblem<'a> {
         drop(matrix);
         let solved = Instant::now();
         let residual = match self.testing {
-            Testing::Galerkin => residual(&panels, &charge, &wanted),
+            Testing::Galerkin => residual(&panels, images.as_deref(), &charge, &wanted),
             Testing::Collocation => 0.0,
         };
         if residual > RESIDUAL {
@@ -171,6 +190,7 @@ impl<'a> BoundaryProblem<'a> {
             mesh: mesh.clone(),
             panels,
             sources: self.sources.to_vec(),
+            ground: self.ground,
             capacitance: CapacitanceMatrix::new(&charges),
             induced,
             coarse,
@@ -193,15 +213,15 @@ impl<'a> BoundaryProblem<'a> {
         for (p, &e) in self.mesh.electrode.iter().enumerate() {
             columns[(p, e as usize)] = 1.0;
         }
+        let of = |source: &Source, x: &Vec3| source.potential_and_gradient_above(self.ground.as_ref(), x).0;
         for (s, source) in self.sources.iter().enumerate() {
             for (p, panel) in panels.iter().enumerate() {
                 // The electrode's potential is zero: its own charges cancel what the source brings.
                 let outside = match self.testing {
-                    Testing::Collocation => source.potential_and_gradient(&panel.centroid).0,
-                    Testing::Galerkin => quadrature::rule(5)
-                        .on(&panel.corners)
-                        .map(|(x, weight)| weight * source.potential_and_gradient(&x).0)
-                        .sum(),
+                    Testing::Collocation => of(source, &panel.centroid),
+                    Testing::Galerkin => {
+                        quadrature::rule(5).on(&panel.corners).map(|(x, weight)| weight * of(source, &x)).sum()
+                    }
                 };
                 if !outside.is_finite() {
                     let electrode = self.mesh.electrodes[self.mesh.electrode[p] as usize].name.clone();
@@ -267,7 +287,7 @@ impl<'a> BoundaryProblem<'a> {
 }
 
 /// Largest relative error of the potentials on some rows, each computed anew without the matrix.
-fn residual(panels: &[Panel], charge: &Mat<f64>, wanted: &Mat<f64>) -> f64 {
+fn residual(panels: &[Panel], images: Option<&[Panel]>, charge: &Mat<f64>, wanted: &Mat<f64>) -> f64 {
     let operator = GalerkinOperator { panels };
     let stride = panels.len().div_ceil(CHECKED_ROWS).max(1);
     let rows: Vec<usize> = (0..panels.len()).step_by(stride).collect();
@@ -275,7 +295,12 @@ fn residual(panels: &[Panel], charge: &Mat<f64>, wanted: &Mat<f64>) -> f64 {
         .map(|column| {
             let x: Vec<f64> = charge.col(column).iter().copied().collect();
             let largest = wanted.col(column).iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
-            let errors = rows.par_iter().map(|&i| (operator.row(i, &x) - wanted[(i, column)]).abs() / largest);
+            let of_image = |i: usize| -> f64 {
+                let images = images.into_iter().flatten().zip(&x);
+                images.map(|(image, x)| galerkin(&panels[i], image, false) * x).sum()
+            };
+            let potential = |i: usize| operator.row(i, &x) - of_image(i);
+            let errors = rows.par_iter().map(|&i| (potential(i) - wanted[(i, column)]).abs() / largest);
             errors.reduce(|| 0.0, f64::max)
         })
         .fold(0.0, f64::max)

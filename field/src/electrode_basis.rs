@@ -12,6 +12,7 @@ use crate::coarse::CoarseCapacitance;
 use crate::curved::{CurvedCharge, CurvedSolution};
 use crate::panel::Panel;
 use crate::panel_sum::PanelSum;
+use crate::plane::Plane;
 use crate::source::Source;
 
 /// What the charges of a solution are.
@@ -37,6 +38,8 @@ pub struct ElectrodeBasis {
     pub panels: Vec<Panel>,
     /// Outside fields in closed form.
     pub sources: Vec<Source>,
+    /// A grounded plane, with everything above it: every charge and every source has an image of opposite sign.
+    pub ground: Option<Plane>,
     /// What its charges are.
     pub form: SurfaceCharge,
     /// Charge of each panel (row) in each basis function (column), C per volt or per unit of source strength. Where the form is
@@ -60,6 +63,7 @@ impl ElectrodeBasis {
     pub fn from_charges(
         mesh: SurfaceMesh,
         sources: Vec<Source>,
+        ground: Option<Plane>,
         charges: &[f64],
         capacitance: CapacitanceMatrix,
         induced: Vec<Vec<f64>>,
@@ -69,11 +73,27 @@ impl ElectrodeBasis {
         assert_eq!(charges.len(), rows * columns, "a charge for each panel and basis function");
         let panels = (0..rows).map(|p| Panel::new(mesh.corners(p))).collect();
         let charge = Mat::from_fn(rows, columns, |p, k| charges[k * rows + p]);
-        Self { mesh, panels, sources, form: SurfaceCharge::Panels, charge, capacitance, induced, coarse: None, report }
+        Self {
+            mesh,
+            panels,
+            sources,
+            ground,
+            form: SurfaceCharge::Panels,
+            charge,
+            capacitance,
+            induced,
+            coarse: None,
+            report,
+        }
     }
 
     /// A solution with curved elements; `mesh` shows it and is what grains strike.
-    pub fn from_curved(mesh: SurfaceMesh, sources: Vec<Source>, solution: CurvedSolution) -> Self {
+    pub fn from_curved(
+        mesh: SurfaceMesh,
+        sources: Vec<Source>,
+        ground: Option<Plane>,
+        solution: CurvedSolution,
+    ) -> Self {
         let electrodes = mesh.electrodes.len();
         let part = |from: usize, to: usize| -> Vec<Vec<f64>> {
             solution.totals.iter().map(|row| row[from..to].to_vec()).collect()
@@ -87,12 +107,13 @@ impl ElectrodeBasis {
             residual: 0.0,
             matrix_bytes: solution.matrix_bytes,
         };
-        Self::shown(mesh, sources, Arc::new(solution.charge), capacitance, induced, report)
+        Self::shown(mesh, sources, ground, Arc::new(solution.charge), capacitance, induced, report)
     }
 
     fn shown(
         mesh: SurfaceMesh,
         sources: Vec<Source>,
+        ground: Option<Plane>,
         curved: Arc<CurvedCharge>,
         capacitance: CapacitanceMatrix,
         induced: Vec<Vec<f64>>,
@@ -103,7 +124,7 @@ impl ElectrodeBasis {
         let (densities, functions) = (curved.densities(&middles), curved.functions);
         let charge = Mat::from_fn(panels.len(), functions, |p, k| densities[p * functions + k] * panels[p].area);
         let form = SurfaceCharge::Curved(curved);
-        Self { mesh, panels, sources, form, charge, capacitance, induced, coarse: None, report }
+        Self { mesh, panels, sources, ground, form, charge, capacitance, induced, coarse: None, report }
     }
 
     /// The charges of all panels, basis function after basis function, C.
@@ -144,6 +165,7 @@ impl ElectrodeBasis {
 struct Stored {
     mesh: SurfaceMesh,
     sources: Vec<Source>,
+    ground: Option<Plane>,
     charge: StoredCharge,
     capacitance: CapacitanceMatrix,
     induced: Vec<Vec<f64>>,
@@ -165,8 +187,8 @@ impl From<ElectrodeBasis> for Stored {
             SurfaceCharge::Panels => StoredCharge::Panels(basis.charges()),
             SurfaceCharge::Curved(charge) => StoredCharge::Curved((**charge).clone()),
         };
-        let ElectrodeBasis { mesh, sources, capacitance, induced, report, .. } = basis;
-        Self { mesh, sources, charge, capacitance, induced, report }
+        let ElectrodeBasis { mesh, sources, ground, capacitance, induced, report, .. } = basis;
+        Self { mesh, sources, ground, charge, capacitance, induced, report }
     }
 }
 
@@ -175,7 +197,7 @@ impl TryFrom<Stored> for ElectrodeBasis {
 
     /// Numbers that do not fit together make no solution.
     fn try_from(stored: Stored) -> Result<Self, Self::Error> {
-        let Stored { mesh, sources, charge, capacitance, induced, report } = stored;
+        let Stored { mesh, sources, ground, charge, capacitance, induced, report } = stored;
         let (panels, electrodes) = (mesh.triangles.len(), mesh.electrodes.len());
         let corners = mesh.triangles.iter().flatten().all(|v| (*v as usize) < mesh.vertices.len());
         let owners = mesh.electrode.len() == panels && mesh.electrode.iter().all(|e| (*e as usize) < electrodes);
@@ -186,13 +208,13 @@ impl TryFrom<Stored> for ElectrodeBasis {
         }
         match charge {
             StoredCharge::Panels(charges) if panels.checked_mul(electrodes + sources.len()) == Some(charges.len()) => {
-                Ok(Self::from_charges(mesh, sources, &charges, capacitance, induced, report))
+                Ok(Self::from_charges(mesh, sources, ground, &charges, capacitance, induced, report))
             }
             StoredCharge::Panels(_) => Err("not a charge for each panel and basis function"),
             StoredCharge::Curved(charge)
                 if charge.is_whole(electrodes) && charge.functions == electrodes + sources.len() =>
             {
-                Ok(Self::shown(mesh, sources, Arc::new(charge), capacitance, induced, report))
+                Ok(Self::shown(mesh, sources, ground, Arc::new(charge), capacitance, induced, report))
             }
             StoredCharge::Curved(_) => Err("charges and elements do not fit together"),
         }

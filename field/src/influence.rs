@@ -47,11 +47,22 @@ const TOUCHING: f64 = 0.25;
 
 /// The matrix of potential coefficients, 1/m. For Galerkin testing only the lower triangle is filled.
 pub fn potential_coefficients(panels: &[Panel], testing: Testing) -> Mat<f64> {
-    potential_coefficients_telling(panels, testing, &|_| ())
+    potential_coefficients_telling(panels, None, testing, &|_| ())
 }
 
-/// As [`potential_coefficients`]; `progress` hears the fraction of the entries that are done, from any thread.
-pub fn potential_coefficients_telling(panels: &[Panel], testing: Testing, progress: &(dyn Fn(f64) + Sync)) -> Mat<f64> {
+/// As [`potential_coefficients`]; `progress` hears the fraction of the entries that are done, from any thread. With `images`,
+/// one for each panel, each panel's charge goes with one of opposite sign on its image. With mirror images in a plane that no
+/// panel touches the Galerkin matrix stays symmetric, and positive definite: it holds the energy of the field above the plane.
+///
+/// # Panics
+/// Another number of images than of panels.
+pub fn potential_coefficients_telling(
+    panels: &[Panel],
+    images: Option<&[Panel]>,
+    testing: Testing,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Mat<f64> {
+    assert!(images.is_none_or(|images| images.len() == panels.len()), "an image for each panel");
     let n = panels.len();
     let (done, all) = (AtomicUsize::new(0), (n * (n + 1) / 2) as f64);
     let mut matrix = Mat::<f64>::zeros(n, n);
@@ -60,12 +71,18 @@ pub fn potential_coefficients_telling(panels: &[Panel], testing: Testing, progre
         Testing::Galerkin => {
             for i in j..n {
                 column[i] = galerkin(&panels[i], &panels[j], i == j);
+                if let Some(images) = images {
+                    column[i] -= galerkin(&panels[i], &images[j], false);
+                }
             }
             progress((done.fetch_add(n - j, Ordering::Relaxed) + n - j) as f64 / all);
         }
         Testing::Collocation => {
             for i in 0..n {
                 column[i] = panels[j].potential(&panels[i].centroid) / panels[j].area;
+                if let Some(images) = images {
+                    column[i] -= images[j].potential(&panels[i].centroid) / images[j].area;
+                }
             }
             progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / n as f64);
         }

@@ -69,6 +69,7 @@ pub mod panel;
 mod panel_groups;
 pub mod panel_sum;
 mod pieces;
+mod plane;
 pub mod source;
 pub mod table;
 pub mod waveform;
@@ -82,6 +83,7 @@ pub use electrode_basis::{ElectrodeBasis, SurfaceCharge};
 pub use linear_operator::LinearOperator;
 pub use panel::Panel;
 pub use panel_sum::PanelSum;
+pub use plane::Plane;
 pub use source::{Source, SourceKind};
 pub use table::{
     Grid, PotentialTable, TableError, TableOptions, TableReport, TabulatedField, starting_spacing, tabulate,

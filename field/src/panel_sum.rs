@@ -9,6 +9,7 @@ use crate::constants::COULOMB;
 use crate::curved::CurvedSum;
 use crate::electrode_basis::{ElectrodeBasis, SurfaceCharge};
 use crate::panel_groups::{ON_SURFACE, PanelGroups};
+use crate::plane::Plane;
 use crate::source::Source;
 use crate::{BasisField, Samples};
 
@@ -17,9 +18,12 @@ use crate::{BasisField, Samples};
 /// Inside a solid electrode the potential is its own and the field zero; on the surface of a solid electrode the field is that
 /// just outside, on a sheet or a hollow electrode the mean of both sides. Closer to a surface than a panel is wide the field repeats the steps of the
 /// charge from panel to panel.
+///
+/// Above a grounded plane all charges have their images; on the plane the field is that just above, below it there is none.
 pub struct PanelSum {
     charges: Charges,
     sources: Vec<Source>,
+    ground: Option<Plane>,
     /// Weight of each source in each channel: `source * channels + channel`.
     source_weight: Vec<f64>,
     /// Potential of each electrode in each channel, V: `electrode * channels + channel`.
@@ -76,6 +80,7 @@ impl PanelSum {
         Self {
             charges,
             sources: basis.sources.clone(),
+            ground: basis.ground,
             source_weight: per(electrodes, basis.sources.len()),
             electrode_potential: per(0, electrodes),
             tree: Arc::new(SurfaceTree::new(&basis.mesh)),
@@ -95,6 +100,11 @@ impl PanelSum {
         if self.any_solid { self.tree.inside(point) } else { None }
     }
 
+    /// Whether a point lies below the grounded plane.
+    pub fn below_ground(&self, point: &Vec3) -> bool {
+        self.ground.is_some_and(|plane| plane.holds(point))
+    }
+
     /// The solid electrode that holds a point and does not have it on its surface.
     fn below_surface(&self, point: &Vec3) -> Option<usize> {
         self.inside(point).filter(|_| self.tree.nearest(point, self.surface_reach).is_none())
@@ -108,7 +118,7 @@ impl PanelSum {
     /// Adds potential and gradient of the closed-form sources in every channel at a point.
     pub(crate) fn add_sources(&self, point: &Vec3, potential: &mut [f64], gradient: &mut [Vec3]) {
         for (s, source) in self.sources.iter().enumerate() {
-            let (value, slope) = source.potential_and_gradient(point);
+            let (value, slope) = source.potential_and_gradient_above(self.ground.as_ref(), point);
             for c in 0..self.channels {
                 let weight = self.source_weight[s * self.channels + c];
                 if weight != 0.0 {
@@ -139,13 +149,25 @@ impl BasisField for PanelSum {
         }
         let some = |points: &[Vec3], potential: &mut [f64], gradient: &mut [Vec3]| {
             let inside: Vec<Option<usize>> = points.iter().map(|point| self.below_surface(point)).collect();
-            let outside: Vec<usize> = (0..points.len()).filter(|&p| inside[p].is_none()).collect();
+            let free = |p: &usize| inside[*p].is_none() && !self.below_ground(&points[*p]);
+            let outside: Vec<usize> = (0..points.len()).filter(free).collect();
             let sums = self.charges.sum(&outside.iter().map(|&p| points[p]).collect::<Vec<_>>());
-            for (p, sums) in outside.into_iter().zip(sums.chunks_exact(4 * n)) {
+            // What images do to a point their charges do to its image.
+            let images = self.ground.map(|plane| {
+                let points: Vec<Vec3> = outside.iter().map(|&p| plane.image(&points[p])).collect();
+                (plane, self.charges.sum(&points))
+            });
+            let first_of: Vec<usize> = (0..outside.len()).map(|k| k * 4 * n).collect();
+            for ((p, first), sums) in outside.into_iter().zip(first_of).zip(sums.chunks_exact(4 * n)) {
                 let (potential, gradient) = (&mut potential[p * n..(p + 1) * n], &mut gradient[p * n..(p + 1) * n]);
                 for (c, sum) in sums.chunks_exact(4).enumerate() {
                     potential[c] = sum[0];
                     gradient[c] = Vec3::new(sum[1], sum[2], sum[3]);
+                    if let Some((plane, images)) = &images {
+                        let image = &images[first + 4 * c..first + 4 * c + 4];
+                        potential[c] -= image[0];
+                        gradient[c] -= plane.turned(&Vec3::new(image[1], image[2], image[3]));
+                    }
                 }
                 self.add_sources(&points[p], potential, gradient);
             }

@@ -2,9 +2,11 @@
 
 use meshes::Vec3;
 
+use crate::constants::COULOMB;
 use crate::curved::CurvedPieces;
 use crate::electrode_basis::{ElectrodeBasis, SurfaceCharge};
 use crate::panel::{Panel, quadrature};
+use crate::plane::Plane;
 
 /// A part of a charged surface.
 #[derive(Clone, Copy)]
@@ -14,6 +16,8 @@ pub(crate) struct Piece {
     /// Largest distance of its points from there, m.
     pub radius: f64,
     form: Form,
+    /// It is the image of that part in the grounded plane, with the opposite charge.
+    image: bool,
 }
 
 #[derive(Clone, Copy)]
@@ -26,12 +30,12 @@ impl Piece {
     fn triangle(corners: [Vec3; 3], panel: u32, share: f64) -> Self {
         let center = corners.iter().sum::<Vec3>() / 3.0;
         let radius = corners.iter().map(|c| (c - center).norm()).fold(0.0, f64::max);
-        Self { center, radius, form: Form::Triangle { corners, panel, share } }
+        Self { center, radius, form: Form::Triangle { corners, panel, share }, image: false }
     }
 
     /// A rectangle in the parameters of an element.
     pub fn rectangle(center: Vec3, radius: f64, element: u32, low: [f64; 2], high: [f64; 2]) -> Self {
-        Self { center, radius, form: Form::Rectangle { element, low, high } }
+        Self { center, radius, form: Form::Rectangle { element, low, high }, image: false }
     }
 }
 
@@ -48,8 +52,13 @@ pub(crate) trait Rectangles: Sync {
     fn points(&self, element: u32, low: [f64; 2], high: [f64; 2], degree: usize, each: &mut dyn FnMut(&Vec3, &[f64]));
 }
 
-/// The pieces of a solution.
-pub(crate) enum Pieces<'a> {
+/// The pieces of a solution, with their images in a grounded plane.
+pub(crate) struct Pieces<'a> {
+    surface: Surface<'a>,
+    ground: Option<Plane>,
+}
+
+enum Surface<'a> {
     /// Triangles of constant charge: the panels, and their charges over Coulomb's constant, `panel * functions + function`.
     Panels(&'a [Panel], Vec<f64>, usize),
     /// Elements with charges of their own.
@@ -60,34 +69,41 @@ impl<'a> Pieces<'a> {
     /// Of a solution.
     pub fn new(basis: &'a ElectrodeBasis) -> Self {
         let functions = basis.functions();
-        match &basis.form {
+        let surface = match &basis.form {
             SurfaceCharge::Panels => {
-                let charge = |p: usize| (0..functions).map(move |k| crate::constants::COULOMB * basis.charge[(p, k)]);
-                Self::Panels(&basis.panels, (0..basis.panels.len()).flat_map(charge).collect(), functions)
+                let charge = |p: usize| (0..functions).map(move |k| COULOMB * basis.charge[(p, k)]);
+                Surface::Panels(&basis.panels, (0..basis.panels.len()).flat_map(charge).collect(), functions)
             }
-            SurfaceCharge::Curved(charge) => Self::Elements(Box::new(CurvedPieces::new(charge))),
-        }
+            SurfaceCharge::Curved(charge) => Surface::Elements(Box::new(CurvedPieces::new(charge))),
+        };
+        Self { surface, ground: basis.ground }
     }
 
     /// The whole surface.
     pub fn all(&self) -> Vec<Piece> {
-        match self {
-            Self::Panels(panels, ..) => {
+        let mut all = match &self.surface {
+            Surface::Panels(panels, ..) => {
                 panels.iter().enumerate().map(|(p, panel)| Piece::triangle(panel.corners, p as u32, 1.0)).collect()
             }
-            Self::Elements(elements) => elements.elements(),
+            Surface::Elements(elements) => elements.elements(),
+        };
+        if let Some(plane) = &self.ground {
+            let images: Vec<Piece> =
+                all.iter().map(|piece| Piece { center: plane.image(&piece.center), image: true, ..*piece }).collect();
+            all.extend(images);
         }
+        all
     }
 
     /// The four parts of a piece.
     pub fn quarters(&self, piece: &Piece) -> [Piece; 4] {
-        match (piece.form, self) {
+        let parts = match (piece.form, &self.surface) {
             (Form::Triangle { corners: [a, b, c], panel, share }, _) => {
                 let (ab, bc, ca) = ((a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0);
                 [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]]
                     .map(|corners| Piece::triangle(corners, panel, 0.25 * share))
             }
-            (Form::Rectangle { element, low, high }, Self::Elements(elements)) => {
+            (Form::Rectangle { element, low, high }, Surface::Elements(elements)) => {
                 let middle = [0, 1].map(|k| 0.5 * (low[k] + high[k]));
                 [[false, false], [true, false], [false, true], [true, true]].map(|upper| {
                     let from = [0, 1].map(|k| if upper[k] { middle[k] } else { low[k] });
@@ -95,14 +111,32 @@ impl<'a> Pieces<'a> {
                     elements.part(element, from, to)
                 })
             }
-            (Form::Rectangle { .. }, Self::Panels(..)) => [*piece; 4],
+            (Form::Rectangle { .. }, Surface::Panels(..)) => [*piece; 4],
+        };
+        match self.ground.filter(|_| piece.image) {
+            Some(plane) => parts.map(|part| Piece { center: plane.image(&part.center), image: true, ..part }),
+            None => parts,
         }
     }
 
     /// Calls `each` with points and charges that act like the piece: exact for polynomials of that degree.
     pub fn points(&self, piece: &Piece, degree: usize, each: &mut dyn FnMut(&Vec3, &[f64])) {
-        match (piece.form, self) {
-            (Form::Triangle { corners, panel, share }, Self::Panels(_, charge, functions)) => {
+        match self.ground.filter(|_| piece.image) {
+            None => self.real_points(piece, degree, each),
+            Some(plane) => {
+                let mut opposite = Vec::new();
+                self.real_points(piece, degree, &mut |y, charges| {
+                    opposite.clear();
+                    opposite.extend(charges.iter().map(|q| -q));
+                    each(&plane.image(y), &opposite);
+                });
+            }
+        }
+    }
+
+    fn real_points(&self, piece: &Piece, degree: usize, each: &mut dyn FnMut(&Vec3, &[f64])) {
+        match (piece.form, &self.surface) {
+            (Form::Triangle { corners, panel, share }, Surface::Panels(_, charge, functions)) => {
                 let own = &charge[panel as usize * functions..(panel as usize + 1) * functions];
                 let mut charges = vec![0.0; *functions];
                 for (y, weight) in quadrature::rule(degree).on(&corners) {
@@ -112,7 +146,7 @@ impl<'a> Pieces<'a> {
                     each(&y, &charges);
                 }
             }
-            (Form::Rectangle { element, low, high }, Self::Elements(elements)) => {
+            (Form::Rectangle { element, low, high }, Surface::Elements(elements)) => {
                 elements.points(element, low, high, degree, each);
             }
             _ => {}

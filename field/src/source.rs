@@ -7,6 +7,7 @@ use meshes::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::constants::COULOMB;
+use crate::plane::Plane;
 
 /// The form of a closed-form field of strength one, in its local frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -73,6 +74,17 @@ impl Source {
                 (COULOMB * potential, (outward * along_rho + e3 * along_z) * COULOMB)
             }
         }
+    }
+
+    /// The same above a grounded plane, if there is one: with the image of opposite sign, and zero below the plane.
+    pub fn potential_and_gradient_above(&self, ground: Option<&Plane>, point: &Vec3) -> (f64, Vec3) {
+        let Some(plane) = ground else { return self.potential_and_gradient(point) };
+        if plane.holds(point) {
+            return (0.0, Vec3::zeros());
+        }
+        let (value, slope) = self.potential_and_gradient(point);
+        let (image, image_slope) = self.potential_and_gradient(&plane.image(point));
+        (value - image, slope - plane.turned(&image_slope))
     }
 
     /// Whether a point is where the field is infinite.

@@ -2,6 +2,7 @@
 
 mod capacitance;
 mod composite;
+mod grounded_plane;
 mod panel_integrals;
 mod paul_trap;
 mod sphere_in_field;

@@ -13,7 +13,7 @@ pub use crate::keys::settings::{Gas, Integrator, Method, Reflection, Solver};
 pub use electrode::{Drive, Electrode, ElectrodeShape, ImportedMesh, MeshFormat, Source, SourceKind};
 pub use parts::CaseParts;
 pub use settings::{
-    Drag, FieldSettings, Forces, GrainGroup, Output, Region, Sweep, SweepAxis, TableSettings, TraceSettings,
+    Drag, FieldSettings, Forces, GROUND, GrainGroup, Output, Region, Sweep, SweepAxis, TableSettings, TraceSettings,
 };
 
 use crate::case_source::CaseSource;

@@ -1,5 +1,6 @@
 //! Everything in a case that is neither electrode nor source.
 
+use field::Plane;
 use meshes::Vec3;
 use serde::Serialize;
 use tracer::{Launch, Place};
@@ -19,7 +20,12 @@ pub struct FieldSettings {
     pub solver: Solver,
     /// What the charges sit on and how the boundary condition is imposed on them.
     pub method: Method,
+    /// An infinite plane at 0 V with everything above it. Then nothing else is called [`GROUND`].
+    pub ground: Option<Plane>,
 }
+
+/// What the grounded plane is called in results.
+pub const GROUND: &str = "ground";
 
 /// The tabulated potential.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::arguments::ProbeArguments;
 use super::fields::{solved, tabulated};
 use super::session::Session;
+use crate::case::GROUND;
 use crate::pipeline::drives::{exact_field, tabulated_field};
 use crate::pipeline::ready::ready;
 use crate::pipeline::{Failure, region};
@@ -112,7 +113,10 @@ pub(super) fn probe(session: &Session, arguments: &ProbeArguments) -> Result<(),
                 .zip(&unit.potential[p * functions..(p + 1) * functions])
                 .map(|(name, value)| ((*name).clone(), (*value).into()))
                 .collect(),
-            inside: exact.inside(&places[p]).map(|e| case.electrodes[e].name.clone()),
+            inside: match exact.inside(&places[p]) {
+                Some(electrode) => Some(case.electrodes[electrode].name.clone()),
+                None => exact.below_ground(&places[p]).then(|| GROUND.to_owned()),
+            },
             outside_table: arguments.table
                 && (0..3).any(|k| places[p][k] < bounds.min[k] || places[p][k] > bounds.max[k]),
         })

@@ -3,13 +3,11 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use meshes::SurfaceTree;
-
 use super::fields;
 use super::session::Session;
 use crate::output::summary::TraceSummary;
 use crate::output::{pictures, tracks};
-use crate::pipeline::flights::fly;
+use crate::pipeline::flights::{fly, obstacles};
 use crate::pipeline::ready::{flight_region, ready};
 use crate::pipeline::{Failure, Reporter};
 
@@ -33,8 +31,8 @@ pub(super) fn run(session: &Session, trace: bool) -> Result<(), Failure> {
         && !ready.ensemble.is_empty()
     {
         let mesh = &solution.basis.mesh;
-        let surface = (mesh.panels() > 0).then(|| Arc::new(SurfaceTree::new(mesh)));
         let region = flight_region(case, mesh);
+        let surface = obstacles(mesh, case.field.ground.as_ref(), &region);
         let reporter: Arc<dyn Reporter> = session.progress.clone();
         let flights = fly(case, settings, source, driven.field, surface, &ready.ensemble, region, &reporter)?;
         session.progress.stage("write");

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::value::{Count, Fraction, Vector, Whole};
+use super::value::{Count, DirectionKeys, Fraction, Vector, Whole};
 use crate::quantity::kinds::{Acceleration, Force, Length, MagneticField, Memory, Pressure, Temperature, Time};
 use crate::quantity::{Drag, NonNegative, Positive, Si};
 
@@ -21,6 +21,18 @@ pub(crate) struct FieldKeys {
     pub solver: Option<Solver>,
     /// What the charges sit on and how the boundary condition is imposed on them; left out: "auto".
     pub method: Option<Method>,
+    /// An infinite plane at 0 V with everything on the side that its axis points to; left out: none.
+    pub ground: Option<GroundKeys>,
+}
+
+/// An infinite plane at 0 V. The field of a source above it includes that of its image.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct GroundKeys {
+    /// A point of the plane; the origin if left out.
+    pub center: Option<Vector<Length>>,
+    /// Its normal, to the side of the electrodes; left out: "z".
+    pub axis: Option<DirectionKeys>,
 }
 
 /// What solves for the charges.

@@ -29,7 +29,7 @@ pub struct FieldMap {
     potential: Vec<Vec<f64>>,
     /// Unit gradient likewise.
     gradient: Vec<Vec<Vec3>>,
-    /// 0 outside conductors, 1 + the number of the electrode inside it.
+    /// 0 outside conductors, 1 + the number of the electrode inside it; below a grounded plane one more than the last.
     conductor: Vec<u32>,
     /// Voltage of each channel at the start.
     at_start: Vec<f64>,
@@ -57,7 +57,9 @@ impl FieldMap {
             .map(|points| {
                 let mut samples = Samples::default();
                 field.basis().sample(points, &mut samples);
-                (samples, points.iter().map(|p| exact.inside(p).map_or(0, |e| e as u32 + 1)).collect())
+                let ground = |p: &Vec3| if exact.below_ground(p) { case.electrodes.len() as u32 + 1 } else { 0 };
+                let conductor = |p: &Vec3| exact.inside(p).map_or_else(|| ground(p), |e| e as u32 + 1);
+                (samples, points.iter().map(conductor).collect())
             })
             .collect();
         let channel = |c: usize| sampled.iter().flat_map(move |(s, _)| s.potential.iter().skip(c).step_by(channels));

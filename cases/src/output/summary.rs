@@ -6,7 +6,7 @@ use meshes::{MeshReport, SurfaceMesh};
 use serde::Serialize;
 use tracer::{Ensemble, Outcome, Region};
 
-use crate::case::{Case, Drive};
+use crate::case::{Case, Drive, GROUND};
 use crate::pipeline::flights::Flights;
 use crate::pipeline::memory::people;
 use crate::pipeline::solution::Solution;
@@ -251,9 +251,10 @@ impl TraceSummary {
     /// Of flights.
     pub fn new(case: &Case, flights: &Flights) -> Self {
         let traced = &flights.traced;
-        let name = |e: usize| case.electrodes[e].name.clone();
+        // After the electrodes comes the grounded plane.
+        let name = |e: usize| case.electrodes.get(e).map_or(GROUND, |electrode| &electrode.name).to_owned();
         let mut outcomes = Outcomes::default();
-        let mut struck = vec![0_u64; case.electrodes.len()];
+        let mut struck = vec![0_u64; case.electrodes.len() + 1];
         for ending in &traced.endings {
             match ending.outcome {
                 Outcome::TimeUp | Outcome::Stopped => outcomes.time_up += 1,

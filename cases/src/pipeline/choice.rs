@@ -85,6 +85,15 @@ pub fn choose(case: &Case, source: &CaseSource) -> Result<Choice, Failure> {
         );
         return Err(refused("field.method", problem, "write method = \"galerkin\", or leave it out"));
     }
+    if case.field.ground.is_some() {
+        let help = "leave it out, or leave out `ground` and put a large electrode there";
+        if !matches!(solver, Asked::Auto | Asked::Dense) {
+            return Err(refused("field.solver", format!("\"{}\" knows no grounded plane", asked_name(solver)), help));
+        }
+        if method == Method::Curved {
+            return Err(refused("field.method", "\"curved\" knows no grounded plane".to_owned(), help));
+        }
+    }
     if solver == Asked::Axisymmetric {
         check_axisymmetric(case, source)?;
     }
@@ -111,6 +120,16 @@ pub fn choose(case: &Case, source: &CaseSource) -> Result<Choice, Failure> {
     let choice = Choice { solver, elements, why: why.to_owned() };
     connected(&choice, source)?;
     Ok(choice)
+}
+
+fn asked_name(solver: Asked) -> &'static str {
+    match solver {
+        Asked::Auto => "auto",
+        Asked::Dense => Solver::Dense.name(),
+        Asked::Symmetric => Solver::Symmetric.name(),
+        Asked::Axisymmetric => Solver::Axisymmetric.name(),
+        Asked::Multipole => Solver::Multipole.name(),
+    }
 }
 
 /// Refuses what `solution::solve` cannot do yet. Whoever connects a solver there takes it out here.

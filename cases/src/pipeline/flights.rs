@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use field::DrivenField;
-use meshes::SurfaceTree;
+use field::{DrivenField, Plane};
+use meshes::{ElectrodeSurface, SurfaceMesh, SurfaceTree, Vec3};
 use tracer::{
     DragLaw, Ensemble, Gas, GasKind, Group, Method, Options, Region, Sample, System, TraceError, Traced, Trajectories,
     trace,
@@ -12,7 +12,7 @@ use tracer::{
 
 use super::{Failure, Reporter, memory};
 use crate::CaseSource;
-use crate::case::{Case, Drag, Gas as CaseGas, Integrator, Reflection, TraceSettings};
+use crate::case::{Case, Drag, GROUND, Gas as CaseGas, Integrator, Reflection, TraceSettings};
 
 /// Traced grains and what was kept of their ways.
 #[derive(Clone, Debug)]
@@ -186,6 +186,26 @@ fn drag(drag: &Drag) -> Option<tracer::Drag> {
             tracer::Drag::Sphere { gas: gas(kind, pressure, temperature), law }
         }
     })
+}
+
+/// What grains strike: the electrodes and, as one more, so much of a grounded plane as lies in the region. `None` where there
+/// is nothing.
+pub fn obstacles(mesh: &SurfaceMesh, ground: Option<&Plane>, region: &Region) -> Option<Arc<SurfaceTree>> {
+    let Some(plane) = ground else { return (mesh.panels() > 0).then(|| Arc::new(SurfaceTree::new(mesh))) };
+    let mut mesh = mesh.clone();
+    let middle = (region.min + region.max) * 0.5;
+    let foot = middle - plane.normal * plane.height(&middle);
+    let across = plane.normal.cross(&Vec3::ith(plane.normal.iamin(), 1.0)).normalize();
+    let along = plane.normal.cross(&across);
+    // From the foot point the region reaches half its diagonal in the plane; twice that.
+    let reach = (region.max - region.min).norm();
+    let first = mesh.vertices.len() as u32;
+    let corners = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)];
+    mesh.vertices.extend(corners.map(|(a, b)| foot + across * (2.0 * a * reach) + along * (2.0 * b * reach)));
+    mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    mesh.electrode.extend([mesh.electrodes.len() as u32; 2]);
+    mesh.electrodes.push(ElectrodeSurface { name: GROUND.to_owned(), closed: false, hollow: false });
+    Some(Arc::new(SurfaceTree::new(&mesh)))
 }
 
 /// Traces the grains of a case.

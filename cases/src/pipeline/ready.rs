@@ -1,14 +1,14 @@
 //! A case that can be run: what is wrong with its geometry is found before the long work starts.
 
 use field::{ElectrodeBasis, Grid, PotentialTable, Source};
-use meshes::{SurfaceMesh, SurfaceTree};
+use meshes::{SurfaceMesh, SurfaceTree, Vec3};
 use tracer::{Ensemble, Region};
 
 use super::choice::{Choice, choose};
-use super::surface::{Electrodes, check_contacts};
+use super::surface::{Electrodes, check_contacts, check_ground};
 use super::{Failure, Reporter, drives, flights, memory, region};
 use crate::CaseSource;
-use crate::case::{Case, SourceKind};
+use crate::case::{Case, GROUND, SourceKind};
 
 /// What a run starts from.
 #[derive(Clone, Debug)]
@@ -36,6 +36,7 @@ pub fn ready(case: &Case, source: &CaseSource, reporter: &dyn Reporter) -> Resul
     let sources = drives::sources(case, source)?;
     let mut electrodes = Electrodes::new(case, source, reporter)?;
     let mesh = electrodes.mesh(case, source, 1.0, 1.0)?;
+    check_ground(&mesh, case, source)?;
     check_contacts(&mesh, case, source, reporter)?;
     electrodes.emphasise_gaps(case, &mesh, reporter);
     check_table(case, source, &mesh, &sources)?;
@@ -112,6 +113,23 @@ fn check_sources(case: &Case, source: &CaseSource, tree: &SurfaceTree) -> Result
             return Err(source.error_at(&format!("source.{}.center", point.name), problem, help).into());
         }
     }
+    let Some(plane) = &case.field.ground else { return Ok(()) };
+    for field in &case.sources {
+        // How far below its centre it reaches; the others are everywhere.
+        let depth = match field.kind {
+            SourceKind::Point => 0.0,
+            SourceKind::ThinRing { radius } => {
+                let axis = field.placement.axis.try_normalize(0.0).unwrap_or_else(Vec3::z);
+                radius * axis.cross(&plane.normal).norm()
+            }
+            SourceKind::Quadrupole { .. } | SourceKind::Uniform { .. } => continue,
+        };
+        if plane.height(&field.placement.center) <= depth {
+            let problem = format!("it lies on or below the grounded plane `{GROUND}`");
+            let help = "move it up, or the plane down (field.ground.center)";
+            return Err(source.error_at(&format!("source.{}.center", field.name), problem, help).into());
+        }
+    }
     Ok(())
 }
 
@@ -158,7 +176,7 @@ pub(super) fn table_too_large(
     source.error_at(key, problem, help).into()
 }
 
-/// Refuses grains that start where they cannot be: inside a conductor, outside the region, or on a source.
+/// Refuses grains that start where they cannot be: inside a conductor, below the grounded plane, outside the region, or on a source.
 ///
 /// # Errors
 /// Names the group, how many of its grains, and where.
@@ -172,11 +190,13 @@ pub fn check_starts(
 ) -> Result<(), Failure> {
     for (number, group) in case.grains.iter().enumerate() {
         let members = (0..ensemble.len()).filter(|&g| ensemble.groups()[g] as usize == number);
-        let (mut inside, mut outside) = (Vec::new(), Vec::new());
+        let (mut inside, mut outside, mut below) = (Vec::new(), Vec::new(), Vec::new());
         for g in members {
             let p = &ensemble.positions()[g];
             if let Some(electrode) = tree.inside(p) {
                 inside.push((g, electrode));
+            } else if case.field.ground.is_some_and(|plane| plane.height(p) <= 0.0) {
+                below.push(g);
             } else if (0..3).any(|k| p[k] < region.min[k] || p[k] > region.max[k]) {
                 outside.push(g);
             } else if let Some(s) = fields.iter().position(|s| s.is_singular_at(p)) {
@@ -199,6 +219,11 @@ pub fn check_starts(
             let problem = format!("{} inside the conductor `{electrode}`, one at {}", of(inside.len()), place(g));
             let help =
                 "move or shrink the cloud; if the electrode is a chamber that grains fly in, give it hollow = true";
+            return Err(source.error_at(&key, problem, help).into());
+        }
+        if let Some(&g) = below.first() {
+            let problem = format!("{} on or below the grounded plane `{GROUND}`, one at {}", of(below.len()), place(g));
+            let help = "move or shrink the cloud, or move the plane (field.ground.center)";
             return Err(source.error_at(&key, problem, help).into());
         }
         if let Some(&g) = outside.first() {

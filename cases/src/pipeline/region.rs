@@ -1,5 +1,6 @@
 //! Boxes that the case leaves open: where the potential is tabulated, and where grains may be.
 
+use field::Plane;
 use meshes::{SurfaceMesh, Vec3};
 use tracer::Place;
 
@@ -19,6 +20,15 @@ struct Hull(Option<(Vec3, Vec3)>);
 impl Hull {
     fn with(self, p: &Vec3) -> Self {
         Self(Some(self.0.map_or((*p, *p), |(lo, hi)| (lo.inf(p), hi.sup(p)))))
+    }
+
+    /// With the foot points of its corners on a grounded plane: what lies above it is between it and the plane.
+    fn down_to(self, ground: Option<&Plane>) -> Self {
+        let (Some((lo, hi)), Some(plane)) = (self.0, ground) else { return self };
+        (0..8).fold(self, |hull, corner| {
+            let p = Vec3::from_fn(|k, _| if corner >> k & 1 == 0 { lo[k] } else { hi[k] });
+            hull.with(&(p - plane.normal * plane.height(&p)))
+        })
     }
 
     /// Grown by a fraction of the longest side on every side; flat boxes get a thickness.
@@ -48,7 +58,7 @@ fn makers(case: &Case, mesh: &SurfaceMesh) -> Hull {
         let center = source.placement.center;
         hull = hull.with(&(center - Vec3::repeat(reach))).with(&(center + Vec3::repeat(reach)));
     }
-    hull
+    hull.down_to(case.field.ground.as_ref())
 }
 
 /// The same with the starting grains.
@@ -75,7 +85,7 @@ fn hull(case: &Case, mesh: &SurfaceMesh) -> Hull {
         };
         hull = hull.with(&(center - Vec3::repeat(reach))).with(&(center + Vec3::repeat(reach)));
     }
-    hull
+    hull.down_to(case.field.ground.as_ref())
 }
 
 /// The box of the table: the case's, or one round electrodes, sources and starting grains.

@@ -172,7 +172,8 @@ impl<'a> Work<'a> {
             Elements::Collocation => Testing::Collocation,
             Elements::Curved => unreachable!("refused by `choose` until it is connected here"),
         };
-        let problem = BoundaryProblem { mesh, sources: self.sources, testing, with_coarse };
+        let problem =
+            BoundaryProblem { mesh, sources: self.sources, testing, ground: self.case.field.ground, with_coarse };
         let told = problem.solve_telling(&|done| self.reporter.fraction(done));
         let basis = told.map_err(|error| self.explained(error))?;
         self.solve_seconds += start.elapsed().as_secs_f64();
@@ -185,6 +186,10 @@ impl<'a> Work<'a> {
             SolveError::SourceOnElectrode { source_number, .. } => {
                 let name = &self.case.sources[source_number - 1].name;
                 self.source.error_at(&format!("source.{name}.center"), text, "move the source off the electrode").into()
+            }
+            SolveError::OnGround { electrode } => {
+                let key = format!("electrode.{electrode}.center");
+                self.source.error_at(&key, text, "move it up, or the plane down").into()
             }
             SolveError::Degenerate { electrode, .. } | SolveError::NotPositiveDefinite { electrode, .. } => {
                 let help = "panels of it may lie on each other or have no area: look at it with `graintrap mesh`";
@@ -333,7 +338,7 @@ fn trap_points(case: &Case, basis: &ElectrodeBasis) -> Vec<Vec3> {
         let points: Vec<Vec3> = (1..1000)
             .map(|k| (step * k as f64).map(f64::fract))
             .map(|part| region.min + part.component_mul(&size))
-            .filter(|p| field.tree().nearest(p, reach).is_none() && field.inside(p).is_none())
+            .filter(|p| field.tree().nearest(p, reach).is_none() && field.inside(p).is_none() && !field.below_ground(p))
             .take(40)
             .collect();
         if points.len() >= 10 {

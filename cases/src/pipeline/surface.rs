@@ -4,7 +4,7 @@ use meshes::import::{Format, ImportedMesh as Imported};
 use meshes::{Shape, SurfaceMesh, SurfaceTree, Triangulation, triangulate, triangulate_to};
 
 use super::{Failure, Reporter};
-use crate::case::{Case, Drive, ElectrodeShape, ImportedMesh, MeshFormat};
+use crate::case::{Case, Drive, ElectrodeShape, GROUND, ImportedMesh, MeshFormat};
 use crate::{CaseError, CaseSource};
 
 /// What each electrode is made of, ready to be meshed at any fineness.
@@ -110,6 +110,13 @@ impl Electrodes {
                 }
             }
         }
+        if let Some(plane) = &case.field.ground {
+            for (e, wanted) in wanted.iter_mut().enumerate() {
+                // A panel's image is twice as far as the plane.
+                let narrow = |p: usize| mesh.area(p).sqrt() / (2.0 * plane.height(&mesh.centroid(p)));
+                *wanted = mesh.panels_of(e).map(narrow).fold(*wanted, f64::max);
+            }
+        }
         self.emphasis = wanted.into_iter().map(|w| w.clamp(1.0, MOST_EMPHASIS)).collect();
     }
 }
@@ -188,6 +195,35 @@ fn find_hollow(mesh: &mut SurfaceMesh, case: &Case, source: &CaseSource) -> Resu
             }
             (given, inner) => given.unwrap_or(inner.is_some()),
         };
+    }
+    Ok(())
+}
+
+/// Refuses electrodes that touch or cross the grounded plane, or stand below it.
+///
+/// # Errors
+/// Names both.
+pub fn check_ground(mesh: &SurfaceMesh, case: &Case, source: &CaseSource) -> Result<(), Failure> {
+    let (Some(plane), Some((lo, hi))) = (&case.field.ground, mesh.bounds()) else { return Ok(()) };
+    let touch = TOUCH * (hi - lo).norm();
+    for (e, electrode) in case.electrodes.iter().enumerate() {
+        let corners = mesh.panels_of(e).flat_map(|p| mesh.corners(p));
+        let heights = corners.map(|corner| plane.height(&corner));
+        let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        if low > touch {
+            continue;
+        }
+        let (problem, help) = if high <= touch {
+            let problem = format!("`{}` stands below the grounded plane `{GROUND}`", electrode.name);
+            (problem, "move it to the side that field.ground.axis points to, or turn the axis round")
+        } else {
+            let problem = format!(
+                "`{}` touches or crosses the grounded plane `{GROUND}`: it reaches from {low:.4} m to {high:.4} m above it",
+                electrode.name
+            );
+            (problem, "move it up, or the plane down (field.ground.center)")
+        };
+        return Err(source.error_at(&format!("electrode.{}.center", electrode.name), problem, help).into());
     }
     Ok(())
 }

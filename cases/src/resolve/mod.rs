@@ -39,6 +39,9 @@ pub(crate) fn case(source: &CaseSource) -> Result<Case, CaseError> {
     let forces = settings::forces(&root.key("forces"), &keys.forces, &grains)?;
     let trace = settings::trace(&root, keys.trace.as_ref(), &grains, &forces)?;
     let field = settings::field(&root.key("field"), &keys.field)?;
+    if field.ground.is_some() {
+        names::not_ground(&root, &electrodes, &sources)?;
+    }
     Ok(Case {
         title: keys.title.unwrap_or_default(),
         electrodes,

@@ -1,7 +1,7 @@
 //! Names of electrodes, sources, drives and groups of grains.
 
 use super::at::At;
-use crate::case::{Electrode, Source};
+use crate::case::{Electrode, GROUND, Source};
 use crate::error::CaseError;
 use crate::key_path::is_name_character;
 
@@ -61,6 +61,21 @@ pub(super) fn all_different(root: &At, electrodes: &[Electrode], sources: &[Sour
     let sources = sources.iter().enumerate().map(|(n, s)| (s.name.as_str(), "source", n));
     let all: Vec<_> = electrodes.chain(sources).collect();
     different(root, &all, "what shares a voltage can share a drive (see [drive.NAME]) and keep a name of its own")
+}
+
+/// Beside a grounded plane nothing else is called after it: grains strike it by that name.
+pub(super) fn not_ground(root: &At, electrodes: &[Electrode], sources: &[Source]) -> Result<(), CaseError> {
+    let (electrodes, sources) = (electrodes.iter().map(|e| &e.name), sources.iter().map(|s| &s.name));
+    for (list, n) in [
+        ("electrode", electrodes.into_iter().position(|name| name == GROUND)),
+        ("source", sources.into_iter().position(|name| name == GROUND)),
+    ] {
+        if let Some(n) = n {
+            let problem = "{value} is what the plane of `field.ground` is called in results";
+            return Err(root.key(list).entry(n).key("name").error(problem, "give it another name"));
+        }
+    }
+    Ok(())
 }
 
 /// Names of groups of grains must differ.

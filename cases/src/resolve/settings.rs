@@ -1,12 +1,15 @@
 //! `[field]`, `[table]`, `[forces]`, `[trace]` and `[output]` resolved, with the reasons for their defaults.
 
+use field::Plane;
 use meshes::Vec3;
 
 use super::at::At;
 use crate::case::{Drag, FieldSettings, Forces, GrainGroup, Integrator, Output, Region, TableSettings, TraceSettings};
 use crate::error::CaseError;
-use crate::keys::settings::{DragKeys, FieldKeys, ForceKeys, GasDragKeys, OutputKeys, TableKeys, TraceKeys};
-use crate::keys::value::Vector;
+use crate::keys::settings::{
+    DragKeys, FieldKeys, ForceKeys, GasDragKeys, GroundKeys, OutputKeys, TableKeys, TraceKeys,
+};
+use crate::keys::value::{DirectionKeys, Vector};
 use crate::quantity::Kind;
 
 /// Wanted relative error of the field: what one usually knows of real electrodes, and what constant charge on a few thousand
@@ -33,7 +36,16 @@ pub(super) fn field(at: &At, keys: &FieldKeys) -> Result<FieldSettings, CaseErro
         max_panels,
         solver: keys.solver.unwrap_or_default(),
         method: keys.method.unwrap_or_default(),
+        ground: keys.ground.as_ref().map(|keys| ground(&at.key("ground"), keys)).transpose()?,
     })
+}
+
+fn ground(at: &At, keys: &GroundKeys) -> Result<Plane, CaseError> {
+    let axis = keys.axis.as_ref().map_or_else(Vec3::z, DirectionKeys::vector);
+    let Some(normal) = axis.try_normalize(f64::MIN_POSITIVE.sqrt()) else {
+        return Err(at.key("axis").error("{value} has no direction", "give it a length other than zero"));
+    };
+    Ok(Plane { point: keys.center.as_ref().map_or_else(Vec3::zeros, Vector::si), normal })
 }
 
 pub(super) fn table(at: &At, keys: &TableKeys, field: &FieldSettings) -> Result<TableSettings, CaseError> {

@@ -7,6 +7,7 @@ mod common;
 
 mod bad_run;
 mod golden;
+mod ground;
 mod harness;
 mod json;
 mod odd;

@@ -122,6 +122,10 @@ impl BasisField for TabulatedField {
         samples.reset(points.len(), n);
         let mut left = Vec::new();
         for (p, point) in points.iter().enumerate() {
+            // A cell that the grounded plane cuts holds what goes on smoothly below it; there is no field there.
+            if self.exact.below_ground(point) {
+                continue;
+            }
             let potential = &mut samples.potential[p * n..(p + 1) * n];
             let gradient = &mut samples.gradient[p * n..(p + 1) * n];
             if self.table.add(point, potential, gradient) {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::fill::fill;
 use super::{Grid, PotentialTable};
-use crate::{BasisField, ElectrodeBasis, PanelSum, Samples};
+use crate::{BasisField, ElectrodeBasis, PanelSum, Plane, Samples};
 
 /// What is wanted of a table.
 #[derive(Clone, Debug, PartialEq)]
@@ -166,7 +166,7 @@ pub fn starting_spacing(basis: &ElectrodeBasis, options: &TableOptions, interest
         return Ok(spacing);
     }
     let fits = |spacing: f64| bytes(spacing).1 <= options.max_bytes;
-    Ok(wide_spacing(options, spacing, functions, interest, &SurfaceTree::new(&basis.mesh), fits))
+    Ok(wide_spacing(options, spacing, functions, interest, basis, fits))
 }
 
 /// As [`tabulate`], beginning with a spacing (m) that [`starting_spacing`] gave.
@@ -183,7 +183,7 @@ pub fn tabulate_from(
     let exact = basis.panel_sum();
     loop {
         let grid = Grid::new(options.min, options.max, spacing);
-        let clearance = clearances(&grid, exact.tree());
+        let clearance = clearances(&grid, exact.tree(), basis.ground.as_ref());
         let needed = needed_nodes(&grid, &clearance);
         let nodes = fill(basis, grid, &needed, options.accuracy, progress);
         let everywhere = clearance.iter().map(|c| *c >= LAYERS[0]).collect();
@@ -220,13 +220,14 @@ fn wide_spacing(
     first: f64,
     functions: usize,
     interest: &[Vec3],
-    tree: &SurfaceTree,
+    basis: &ElectrodeBasis,
     fits: impl Fn(f64) -> bool,
 ) -> f64 {
+    let tree = SurfaceTree::new(&basis.mesh);
     let mut spacing = first;
     loop {
         let grid = Grid::new(options.min, options.max, spacing);
-        let clearance = clearances(&grid, tree);
+        let clearance = clearances(&grid, &tree, basis.ground.as_ref());
         let free = clearance.iter().filter(|c| **c > INSIDE).count();
         let kept = clearance.iter().filter(|c| **c >= USUAL_LAYER).count();
         let in_box: Vec<usize> = interest.iter().filter_map(|p| grid.locate(p)).map(|(at, _)| grid.cell(at)).collect();
@@ -242,7 +243,7 @@ fn wide_spacing(
 }
 
 /// Distance of each cell from the nearest conductor, in cells; zero where it cuts one, [`INSIDE`] where it lies within.
-fn clearances(grid: &Grid, tree: &SurfaceTree) -> Vec<f64> {
+fn clearances(grid: &Grid, tree: &SurfaceTree, ground: Option<&Plane>) -> Vec<f64> {
     let spacing = grid.spacing();
     let (size, half) = (spacing.max(), 0.5 * spacing.norm());
     let reach = (LAYERS[LAYERS.len() - 1] + 1.0) * size + half;
@@ -250,6 +251,10 @@ fn clearances(grid: &Grid, tree: &SurfaceTree) -> Vec<f64> {
         .into_par_iter()
         .map(|cell| {
             let center = grid.point(grid.cell_indices(cell).map(|i| i as f64 + 0.5));
+            // Wholly below the grounded plane.
+            if ground.is_some_and(|plane| plane.height(&center) < -half) {
+                return INSIDE;
+            }
             match tree.nearest(&center, reach) {
                 Some(nearest) if nearest.distance <= half => 0.0,
                 // Nothing is cut: the whole cell is inside where its centre is.
@@ -308,6 +313,7 @@ fn measure(table: &PotentialTable, clearance: &[f64], exact: &PanelSum, electrod
         laplacian: Vec<f64>,
     }
     let size = table.grid.spacing().max();
+    drawn.retain(|(_, point)| !exact.below_ground(point));
     let errors: Vec<Error> = drawn
         .par_iter()
         .map(|(clearance, point)| {
