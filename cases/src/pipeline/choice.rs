@@ -87,11 +87,8 @@ pub fn choose(case: &Case, source: &CaseSource) -> Result<Choice, Failure> {
     }
     if case.field.ground.is_some() {
         let help = "leave it out, or leave out `ground` and put a large electrode there";
-        if !matches!(solver, Asked::Auto | Asked::Dense) {
+        if matches!(solver, Asked::Multipole) {
             return Err(refused("field.solver", format!("\"{}\" knows no grounded plane", asked_name(solver)), help));
-        }
-        if method == Method::Curved {
-            return Err(refused("field.method", "\"curved\" knows no grounded plane".to_owned(), help));
         }
     }
     if solver == Asked::Axisymmetric {
@@ -105,13 +102,30 @@ pub fn choose(case: &Case, source: &CaseSource) -> Result<Choice, Failure> {
         let problem = "\"galerkin\" is for flat triangles, and solver = \"axisymmetric\" has curves".to_owned();
         return Err(refused("field.method", problem, "leave out `method`, or choose another solver"));
     }
-    let elements = match (method, solver) {
-        (Method::Curved, _) | (Method::Auto, Asked::Axisymmetric) => Elements::Curved,
-        (Method::Collocation, _) => Elements::Collocation,
-        (Method::Auto | Method::Galerkin, _) => Elements::Galerkin,
+    let panels = case.field.panels.is_some() || case.electrodes.iter().any(|e| e.panels.is_some());
+    let flat = flat_only(case);
+    if let (Method::Curved, Some(electrode)) = (method, flat) {
+        let problem = format!("\"curved\" does not know the true surface of `{electrode}` yet, only its triangles");
+        return Err(refused("field.method", problem, "write method = \"galerkin\", or leave it out"));
+    }
+    let (elements, because) = match (method, solver) {
+        (Method::Curved, _) => (Elements::Curved, "the case asks for curved elements"),
+        (Method::Auto, Asked::Axisymmetric) => (Elements::Curved, "curves are what it solves on"),
+        (Method::Collocation | Method::Galerkin, _) => {
+            let method = if method == Method::Galerkin { Elements::Galerkin } else { Elements::Collocation };
+            (method, "the case asks for flat panels")
+        }
+        (Method::Auto, Asked::Multipole) => (Elements::Galerkin, "multipoles act between flat panels"),
+        (Method::Auto, _) if panels => (Elements::Galerkin, "the case says how many panels there are"),
+        (Method::Auto, _) if flat.is_some() => (Elements::Galerkin, "of some electrode only triangles are known"),
+        (Method::Auto, _) => (Elements::Curved, "the true surface of every electrode is known"),
     };
     let (solver, why) = match solver {
-        Asked::Auto => (Solver::Dense, "it takes electrodes of any shape"),
+        Asked::Auto if AXIAL && elements == Elements::Curved && check_axisymmetric(case, source).is_ok() => {
+            (Solver::Axisymmetric, "everything is round about one axis")
+        }
+        Asked::Auto if elements == Elements::Curved => (Solver::Symmetric, because),
+        Asked::Auto => (Solver::Dense, because),
         Asked::Dense => (Solver::Dense, "the case asks for it"),
         Asked::Symmetric => (Solver::Symmetric, "the case asks for it"),
         Asked::Axisymmetric => (Solver::Axisymmetric, "the case asks for it"),
@@ -120,6 +134,15 @@ pub fn choose(case: &Case, source: &CaseSource) -> Result<Choice, Failure> {
     let choice = Choice { solver, elements, why: why.to_owned() };
     connected(&choice, source)?;
     Ok(choice)
+}
+
+const AXIAL: bool = false;
+
+/// An electrode of which only triangles are known.
+fn flat_only(case: &Case) -> Option<&str> {
+    let smooth =
+        |shape: &ElectrodeShape| matches!(shape, ElectrodeShape::Shape(shape) if meshes::patches(shape).is_some());
+    case.electrodes.iter().find(|e| !smooth(&e.shape)).map(|e| e.name.as_str())
 }
 
 fn asked_name(solver: Asked) -> &'static str {
@@ -135,12 +158,13 @@ fn asked_name(solver: Asked) -> &'static str {
 /// Refuses what `solution::solve` cannot do yet. Whoever connects a solver there takes it out here.
 fn connected(choice: &Choice, source: &CaseSource) -> Result<(), CaseError> {
     let help = "leave it out";
-    if choice.solver != Solver::Dense {
-        let problem = format!("\"{}\" is not part of this version", choice.solver.name());
+    let connected = match choice.elements {
+        Elements::Curved => matches!(choice.solver, Solver::Dense | Solver::Symmetric),
+        Elements::Galerkin | Elements::Collocation => choice.solver == Solver::Dense,
+    };
+    if !connected {
+        let problem = format!("\"{}\" does not go with {} elements", choice.solver.name(), choice.elements.name());
         return Err(source.error_at("field.solver", problem, help));
-    }
-    if choice.elements == Elements::Curved {
-        return Err(source.error_at("field.method", "\"curved\" is not part of this version", help));
     }
     Ok(())
 }

@@ -5,6 +5,7 @@
 //! work starts.
 
 pub mod choice;
+mod curved;
 pub mod drives;
 pub mod flights;
 pub mod memory;

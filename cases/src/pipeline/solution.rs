@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use field::influence::Testing;
 use field::{BasisField, BoundaryProblem, ElectrodeBasis, Samples, SolveError, Source};
-use meshes::{SurfaceMesh, Vec3};
+use meshes::{SurfaceMesh, SurfaceTree, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::choice::{Choice, Elements};
@@ -64,6 +64,9 @@ pub fn solve(case: &Case, source: &CaseSource, ready: &Ready, reporter: &dyn Rep
         let basis = work.solve(&ready.mesh, false)?;
         return Ok(work.done(basis, 0.0, "closed form"));
     }
+    if work.choice.elements == Elements::Curved {
+        return work.solve_curved();
+    }
     let (mut mesh, mut fineness) = work.starting_mesh()?;
     let pinned = is_pinned(case);
     let mut before: Option<ElectrodeBasis> = None;
@@ -112,16 +115,16 @@ fn is_pinned(case: &Case) -> bool {
     case.field.panels.is_some() || case.electrodes.iter().all(|e| e.panels.is_some())
 }
 
-struct Work<'a> {
-    case: &'a Case,
-    source: &'a CaseSource,
-    reporter: &'a dyn Reporter,
-    sources: &'a [Source],
-    electrodes: &'a Electrodes,
-    choice: &'a Choice,
-    warnings: Vec<String>,
-    mesh_seconds: f64,
-    solve_seconds: f64,
+pub(super) struct Work<'a> {
+    pub(super) case: &'a Case,
+    pub(super) source: &'a CaseSource,
+    pub(super) reporter: &'a dyn Reporter,
+    pub(super) sources: &'a [Source],
+    pub(super) electrodes: &'a Electrodes,
+    pub(super) choice: &'a Choice,
+    pub(super) warnings: Vec<String>,
+    pub(super) mesh_seconds: f64,
+    pub(super) solve_seconds: f64,
 }
 
 impl<'a> Work<'a> {
@@ -139,12 +142,12 @@ impl<'a> Work<'a> {
         }
     }
 
-    fn warn(&mut self, text: String) {
+    pub(super) fn warn(&mut self, text: String) {
         self.reporter.warning(&text);
         self.warnings.push(text);
     }
 
-    fn mesh(&mut self, fineness: f64, share: f64) -> Result<SurfaceMesh, Failure> {
+    pub(super) fn mesh(&mut self, fineness: f64, share: f64) -> Result<SurfaceMesh, Failure> {
         let start = Instant::now();
         let mesh = self.electrodes.mesh(self.case, self.source, fineness, share)?;
         self.mesh_seconds += start.elapsed().as_secs_f64();
@@ -170,7 +173,7 @@ impl<'a> Work<'a> {
         let testing = match self.choice.elements {
             Elements::Galerkin => Testing::Galerkin,
             Elements::Collocation => Testing::Collocation,
-            Elements::Curved => unreachable!("refused by `choose` until it is connected here"),
+            Elements::Curved => unreachable!("solved by `solve_curved`"),
         };
         let problem =
             BoundaryProblem { mesh, sources: self.sources, testing, ground: self.case.field.ground, with_coarse };
@@ -180,7 +183,7 @@ impl<'a> Work<'a> {
         Ok(basis)
     }
 
-    fn explained(&self, error: SolveError) -> Failure {
+    pub(super) fn explained(&self, error: SolveError) -> Failure {
         let text = error.to_string();
         match error {
             SolveError::SourceOnElectrode { source_number, .. } => {
@@ -274,7 +277,7 @@ impl<'a> Work<'a> {
     /// Largest difference of the unit fields of two solutions at points of the trap region, against the strongest of each
     /// basis function there.
     fn field_difference(&self, one: &ElectrodeBasis, other: &ElectrodeBasis) -> f64 {
-        let points = trap_points(self.case, one);
+        let points = trap_points(self.case, &one.mesh);
         let (mut a, mut b) = (Samples::default(), Samples::default());
         one.panel_sum().sample(&points, &mut a);
         other.panel_sum().sample(&points, &mut b);
@@ -301,7 +304,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    fn done(mut self, basis: ElectrodeBasis, error_estimate: f64, estimated_by: &str) -> Solution {
+    pub(super) fn done(mut self, basis: ElectrodeBasis, error_estimate: f64, estimated_by: &str) -> Solution {
         let tolerance = error_estimate.max(1e-12);
         for defect in basis.capacitance.defects(tolerance) {
             self.warn(format!("the capacitance matrix is not what it must be: {defect}"));
@@ -320,15 +323,16 @@ impl<'a> Work<'a> {
 }
 
 /// Largest difference of two matrices, against the largest entry.
-fn matrix_difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
+pub(super) fn matrix_difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     let largest = a.iter().flatten().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
     a.iter().flatten().zip(b.iter().flatten()).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max) / largest
 }
 
 /// Points spread over the trap region, clear of conductors: a tenth of the box where there is room for that.
-fn trap_points(case: &Case, basis: &ElectrodeBasis) -> Vec<Vec3> {
-    let region = region::trap_box(case, &basis.mesh);
-    let field = basis.panel_sum();
+pub(super) fn trap_points(case: &Case, mesh: &SurfaceMesh) -> Vec<Vec3> {
+    let region = region::trap_box(case, mesh);
+    let tree = SurfaceTree::new(mesh);
+    let buried = |p: &Vec3| case.field.ground.is_some_and(|plane| plane.holds(p));
     let size = region.max - region.min;
     // The sequence of Roberts (2018) in three dimensions: even coverage, always the same.
     let g: f64 = 1.220_744_084_605_76;
@@ -338,7 +342,7 @@ fn trap_points(case: &Case, basis: &ElectrodeBasis) -> Vec<Vec3> {
         let points: Vec<Vec3> = (1..1000)
             .map(|k| (step * k as f64).map(f64::fract))
             .map(|part| region.min + part.component_mul(&size))
-            .filter(|p| field.tree().nearest(p, reach).is_none() && field.inside(p).is_none() && !field.below_ground(p))
+            .filter(|p| tree.nearest(p, reach).is_none() && tree.inside(p).is_none() && !buried(p))
             .take(40)
             .collect();
         if points.len() >= 10 {

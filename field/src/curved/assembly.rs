@@ -9,10 +9,12 @@ use super::element::CurvedMesh;
 use super::kernel::{Moments, Precision, Whole, near_moments, own_moments};
 use super::legendre::{MAX_ORDER, Transform, gauss};
 use super::symmetry::Symmetry;
+use crate::plane::Plane;
 
 /// What all rows of a matrix share.
 pub struct Assembly<'a> {
     mesh: &'a CurvedMesh,
+    ground: Option<Plane>,
     precision: Precision,
     transform: Transform,
     /// Coordinates of all points.
@@ -25,11 +27,12 @@ pub struct Assembly<'a> {
 
 impl<'a> Assembly<'a> {
     /// For a relative accuracy of the charge.
-    pub fn new(mesh: &'a CurvedMesh, points: &[Vec3], accuracy: f64) -> Self {
+    pub fn new(mesh: &'a CurvedMesh, points: &[Vec3], ground: Option<Plane>, accuracy: f64) -> Self {
         let rule = gauss(mesh.order);
         let weights = rule.weights.iter().flat_map(|u| rule.weights.iter().map(move |v| u * v)).collect();
         Self {
             mesh,
+            ground,
             precision: Precision::new(mesh.order, accuracy),
             transform: Transform::new(mesh.order),
             places: [0, 1, 2].map(|k| points.iter().map(|p| p[k]).collect()),
@@ -47,14 +50,27 @@ impl<'a> Assembly<'a> {
     /// The potential at a point (its number) for a unit of charge per parameter at each point, 1/m: one row of the matrix.
     pub fn row(&self, target: usize, row: &mut [f64]) {
         let x = Vec3::new(self.places[0][target], self.places[1][target], self.places[2][target]);
+        self.fill(&x, Some(target), row);
+        if let Some(plane) = &self.ground {
+            // What images do to a point their charges do to its image.
+            let mut images = vec![0.0; row.len()];
+            self.fill(&plane.image(&x), None, &mut images);
+            for (value, image) in row.iter_mut().zip(images) {
+                *value -= image;
+            }
+        }
+    }
+
+    /// The same for a place, which may be one of the points.
+    fn fill(&self, x: &Vec3, target: Option<usize>, row: &mut [f64]) {
         self.arch.dispatch(|| {
             for e in 0..self.mesh.elements.len() {
                 let ball = &self.elements[e].ball;
                 let range = e * self.each()..(e + 1) * self.each();
                 if (x - ball.center).norm() >= self.precision.far * ball.reach {
-                    self.far(&x, range.clone(), &mut row[range]);
+                    self.far(x, range.clone(), &mut row[range]);
                 } else {
-                    self.near(&x, target, e, &mut row[range]);
+                    self.near(x, target, e, &mut row[range]);
                 }
             }
         });
@@ -72,10 +88,10 @@ impl<'a> Assembly<'a> {
     }
 
     #[inline(always)]
-    fn near(&self, x: &Vec3, target: usize, e: usize, row: &mut [f64]) {
+    fn near(&self, x: &Vec3, target: Option<usize>, e: usize, row: &mut [f64]) {
         let (patch, element) = (self.mesh.patch_of(e), &self.mesh.elements[e]);
         let mut moments: Moments = [[0.0; MAX_ORDER]; MAX_ORDER];
-        if target / self.each() == e {
+        if let Some(target) = target.filter(|target| target / self.each() == e) {
             let local = target % self.each();
             let rule = gauss(self.mesh.order);
             let at = element.parameters(rule.points[local / self.mesh.order], rule.points[local % self.mesh.order]);

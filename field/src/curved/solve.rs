@@ -17,6 +17,7 @@ use super::symmetry::Symmetry;
 use crate::Samples;
 use crate::boundary_problem::SolveError;
 use crate::constants::COULOMB;
+use crate::plane::Plane;
 use crate::source::Source;
 
 /// The electrostatic problem of conductors with curved elements.
@@ -26,6 +27,8 @@ pub struct CurvedProblem<'a> {
     pub names: &'a [String],
     /// Fields in closed form; each induces charges on the electrodes.
     pub sources: &'a [Source],
+    /// A grounded plane, with everything above it.
+    pub ground: Option<Plane>,
     /// Make use of symmetry where there is any.
     pub symmetric: bool,
 }
@@ -41,6 +44,8 @@ pub struct CurvedSolution {
     pub unknowns: usize,
     /// Order of the symmetry group.
     pub symmetry: usize,
+    /// The grounded plane below.
+    pub ground: Option<Plane>,
     /// Bytes of the matrices.
     pub matrix_bytes: u64,
     /// Filling them, s.
@@ -75,7 +80,7 @@ impl CurvedProblem<'_> {
         }
         for (s, source) in self.sources.iter().enumerate() {
             for (p, point) in points.iter().enumerate() {
-                let outside = source.potential_and_gradient(point).0;
+                let outside = source.potential_and_gradient_above(self.ground.as_ref(), point).0;
                 if !outside.is_finite() {
                     let electrode = self.names[electrode[p] as usize].clone();
                     return Err(SolveError::SourceOnElectrode { source_number: s + 1, electrode });
@@ -116,7 +121,8 @@ impl CurvedProblem<'_> {
             .filter(|(_, part)| part.col_iter().any(|c| c.iter().any(|v| v.abs() > 1e-14)))
             .collect();
         let sectors: Vec<u32> = parts.iter().map(|(sector, _)| *sector).collect();
-        let matrices = Assembly::new(mesh, &points, accuracy).matrices(&symmetry, &sectors, &|f| progress(0.9 * f));
+        let matrices =
+            Assembly::new(mesh, &points, self.ground, accuracy).matrices(&symmetry, &sectors, &|f| progress(0.9 * f));
         let assembled = std::time::Instant::now();
         let mut values = Mat::<f64>::zeros(points.len(), wanted.ncols());
         let (mut unknowns, mut matrix_bytes) = (0, 0);
@@ -149,6 +155,7 @@ impl CurvedProblem<'_> {
             totals,
             unknowns,
             symmetry: symmetry.order(),
+            ground: self.ground,
             matrix_bytes,
             assembly_seconds: (assembled - start).as_secs_f64(),
             solve_seconds: assembled.elapsed().as_secs_f64(),

@@ -1,0 +1,118 @@
+//! Solving on the true surface, to the accuracy that a case asks for.
+
+use std::time::Instant;
+
+use field::curved::{CurvedMesh, CurvedProblem, CurvedSolution, solve_to};
+use field::{ElectrodeBasis, Plane, Samples, Source};
+use meshes::{Patch, SurfaceMesh, Vec3, patches};
+
+use super::choice::Solver;
+use super::solution::{Solution, Work, matrix_difference, trap_points};
+use super::{Failure, memory};
+
+/// Panels of the mesh that shows the charge and that grains strike: facets of a sphere then lie within 3e-3 of its radius.
+const SHOWN: f64 = 4000.0;
+
+impl Work<'_> {
+    /// Solves with curved elements.
+    pub(super) fn solve_curved(mut self) -> Result<Solution, Failure> {
+        let shown = self.shown_mesh()?;
+        let (patches, electrode) = self.patches()?;
+        let names: Vec<String> = self.case.electrodes.iter().map(|e| e.name.clone()).collect();
+        let symmetric = self.choice.solver != Solver::Dense;
+        let ground = self.case.field.ground;
+        let problem = CurvedProblem { names: &names, sources: self.sources, ground, symmetric };
+        let start = Instant::now();
+        let points = trap_points(self.case, &shown);
+        let sources = self.sources;
+        let difference =
+            |fine: &CurvedSolution, coarse: &CurvedSolution| difference(fine, coarse, &points, sources, ground);
+        let (asked, limit) = (self.case.field.accuracy, self.limit());
+        let begins = |mesh: &CurvedMesh| self.reporter.stage(&format!("solve {} curved elements", mesh.elements.len()));
+        let progress = |done: f64| self.reporter.fraction(done);
+        let refined = solve_to(&problem, &patches, &electrode, asked, limit, &difference, &begins, &progress);
+        let refined = refined.map_err(|error| self.explained(error))?;
+        let basis = ElectrodeBasis::from_curved(shown, sources.to_vec(), ground, refined.solution);
+        self.solve_seconds += start.elapsed().as_secs_f64();
+        let error = refined.error;
+        if error > asked {
+            let (unknowns, most) = (basis.report.unknowns, self.case.field.max_panels);
+            self.warn(format!(
+                "the field has an estimated error of {error:.1e} with {unknowns} unknowns; {asked:.0e} was asked. Raise field.max_panels (now {most}) to come nearer"
+            ));
+        }
+        Ok(self.done(basis, error, "a finer solution"))
+    }
+
+    /// Largest number of unknowns of one matrix: what the case allows, and what fits in memory.
+    fn limit(&self) -> usize {
+        // Two matrices at a time, and as much again for the rest.
+        let fits = ((memory::available() / 4 / 8) as f64).sqrt() as usize;
+        self.case.field.max_panels.min(fits)
+    }
+
+    /// The mesh that shows the solution.
+    fn shown_mesh(&mut self) -> Result<SurfaceMesh, Failure> {
+        let start = self.mesh(1.0, 1.0)?;
+        let fineness = (SHOWN / start.panels().max(1) as f64).sqrt().clamp(1.0, 4.0);
+        if fineness < 1.1 { Ok(start) } else { self.mesh(fineness, 1.0) }
+    }
+
+    /// The patches of all electrodes in place, and the electrode of each.
+    fn patches(&self) -> Result<(Vec<Patch>, Vec<u32>), Failure> {
+        let (mut all, mut owner) = (Vec::new(), Vec::new());
+        for (e, (electrode, shape)) in self.case.electrodes.iter().zip(&self.electrodes.shapes).enumerate() {
+            for patch in patches(shape).unwrap_or_default() {
+                let placed = patch.placed(&electrode.placement).map_err(|error| {
+                    let key = format!("electrode.{}.{}", electrode.name, error.key);
+                    self.source.error_at(&key, error.problem, error.help)
+                })?;
+                all.push(placed);
+                owner.push(e as u32);
+            }
+        }
+        Ok((all, owner))
+    }
+}
+
+/// The larger of two relative differences: of the capacitance matrices, against the largest entry, and of the unit fields at
+/// points, against the strongest of each.
+fn difference(
+    fine: &CurvedSolution,
+    coarse: &CurvedSolution,
+    points: &[Vec3],
+    sources: &[Source],
+    ground: Option<Plane>,
+) -> f64 {
+    let electrodes = fine.totals.len();
+    let own = |solution: &CurvedSolution| -> Vec<Vec<f64>> {
+        solution.totals.iter().map(|row| row[..electrodes].to_vec()).collect()
+    };
+    let (a, b) = (fine.sample(points), coarse.sample(points));
+    let of_sources = |s: usize, p: &Vec3| sources[s].potential_and_gradient_above(ground.as_ref(), p).1;
+    let fields = field_difference(&a, &b, points, electrodes, sources.len(), &of_sources);
+    matrix_difference(&own(fine), &own(coarse)).max(fields)
+}
+
+/// Largest difference of the unit fields, against the strongest of each; `own` is the field of a source itself.
+fn field_difference(
+    a: &Samples,
+    b: &Samples,
+    points: &[Vec3],
+    electrodes: usize,
+    sources: usize,
+    own: &dyn Fn(usize, &Vec3) -> Vec3,
+) -> f64 {
+    let n = electrodes + sources;
+    let mut largest = 0.0_f64;
+    for k in 0..n {
+        let source = |p: usize| k.checked_sub(electrodes).map_or(Vec3::zeros(), |s| own(s, &points[p]));
+        let all = |value: &dyn Fn(usize) -> f64| (0..points.len()).map(value).fold(0.0, f64::max);
+        let strongest = all(&|p| (a.gradient[p * n + k] + source(p)).norm());
+        let apart = all(&|p| (a.gradient[p * n + k] - b.gradient[p * n + k]).norm());
+        if strongest > 0.0 {
+            largest = largest.max(apart / strongest);
+        }
+    }
+    largest
+}
