@@ -15,6 +15,8 @@ pub(crate) struct Piece {
     pub center: Vec3,
     /// Largest distance of its points from there, m.
     pub radius: f64,
+    /// How far it reaches along its two directions from the middle, m.
+    reach: [f64; 2],
     form: Form,
     /// It is the image of that part in the grounded plane, with the opposite charge.
     image: bool,
@@ -30,12 +32,12 @@ impl Piece {
     fn triangle(corners: [Vec3; 3], panel: u32, share: f64) -> Self {
         let center = corners.iter().sum::<Vec3>() / 3.0;
         let radius = corners.iter().map(|c| (c - center).norm()).fold(0.0, f64::max);
-        Self { center, radius, form: Form::Triangle { corners, panel, share }, image: false }
+        Self { center, radius, reach: [radius; 2], form: Form::Triangle { corners, panel, share }, image: false }
     }
 
     /// A rectangle in the parameters of an element.
-    pub fn rectangle(center: Vec3, radius: f64, element: u32, low: [f64; 2], high: [f64; 2]) -> Self {
-        Self { center, radius, form: Form::Rectangle { element, low, high }, image: false }
+    pub fn rectangle(center: Vec3, radius: f64, reach: [f64; 2], element: u32, low: [f64; 2], high: [f64; 2]) -> Self {
+        Self { center, radius, reach, form: Form::Rectangle { element, low, high }, image: false }
     }
 }
 
@@ -48,8 +50,15 @@ pub(crate) trait Rectangles: Sync {
     fn part(&self, element: u32, low: [f64; 2], high: [f64; 2]) -> Piece;
 
     /// Calls `each` with points (m) and their charges for all functions, over Coulomb's constant (V m): a rule that is exact
-    /// for polynomials of that degree times the charge.
-    fn points(&self, element: u32, low: [f64; 2], high: [f64; 2], degree: usize, each: &mut dyn FnMut(&Vec3, &[f64]));
+    /// for polynomials of these degrees along the two directions times the charge.
+    fn points(
+        &self,
+        element: u32,
+        low: [f64; 2],
+        high: [f64; 2],
+        degree: [usize; 2],
+        each: &mut dyn FnMut(&Vec3, &[f64]),
+    );
 }
 
 /// The pieces of a solution, with their images in a grounded plane.
@@ -95,32 +104,40 @@ impl<'a> Pieces<'a> {
         all
     }
 
-    /// The four parts of a piece.
-    pub fn quarters(&self, piece: &Piece) -> [Piece; 4] {
-        let parts = match (piece.form, &self.surface) {
+    /// The parts of a piece: four, or halves of one much longer than wide.
+    pub fn parts(&self, piece: &Piece) -> impl Iterator<Item = Piece> {
+        let mut parts: [Option<Piece>; 4] = [None; 4];
+        match (piece.form, &self.surface) {
             (Form::Triangle { corners: [a, b, c], panel, share }, _) => {
                 let (ab, bc, ca) = ((a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0);
-                [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]]
-                    .map(|corners| Piece::triangle(corners, panel, 0.25 * share))
+                parts = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]]
+                    .map(|corners| Some(Piece::triangle(corners, panel, 0.25 * share)));
             }
             (Form::Rectangle { element, low, high }, Surface::Elements(elements)) => {
                 let middle = [0, 1].map(|k| 0.5 * (low[k] + high[k]));
-                [[false, false], [true, false], [false, true], [true, true]].map(|upper| {
+                let cut = [0, 1].map(|k| piece.reach[k] > 0.5 * piece.reach[1 - k]);
+                for (upper, part) in [[false, false], [true, false], [false, true], [true, true]].iter().zip(&mut parts)
+                {
+                    if (0..2).any(|k| upper[k] && !cut[k]) {
+                        continue;
+                    }
                     let from = [0, 1].map(|k| if upper[k] { middle[k] } else { low[k] });
-                    let to = [0, 1].map(|k| if upper[k] { high[k] } else { middle[k] });
-                    elements.part(element, from, to)
-                })
+                    let to = [0, 1].map(|k| if cut[k] && !upper[k] { middle[k] } else { high[k] });
+                    *part = Some(elements.part(element, from, to));
+                }
             }
-            (Form::Rectangle { .. }, Surface::Panels(..)) => [*piece; 4],
-        };
-        match self.ground.filter(|_| piece.image) {
-            Some(plane) => parts.map(|part| Piece { center: plane.image(&part.center), image: true, ..part }),
-            None => parts,
+            (Form::Rectangle { .. }, Surface::Panels(..)) => {}
         }
+        let plane = self.ground.filter(|_| piece.image);
+        parts.into_iter().flatten().map(move |part| match plane {
+            Some(plane) => Piece { center: plane.image(&part.center), image: true, ..part },
+            None => part,
+        })
     }
 
-    /// Calls `each` with points and charges that act like the piece: exact for polynomials of that degree.
-    pub fn points(&self, piece: &Piece, degree: usize, each: &mut dyn FnMut(&Vec3, &[f64])) {
+    /// Calls `each` with points and charges that act like the piece: exact for polynomials of the degree that a part of some
+    /// size (m) asks for.
+    pub fn points(&self, piece: &Piece, degree: &dyn Fn(f64) -> usize, each: &mut dyn FnMut(&Vec3, &[f64])) {
         match self.ground.filter(|_| piece.image) {
             None => self.real_points(piece, degree, each),
             Some(plane) => {
@@ -134,12 +151,12 @@ impl<'a> Pieces<'a> {
         }
     }
 
-    fn real_points(&self, piece: &Piece, degree: usize, each: &mut dyn FnMut(&Vec3, &[f64])) {
+    fn real_points(&self, piece: &Piece, degree: &dyn Fn(f64) -> usize, each: &mut dyn FnMut(&Vec3, &[f64])) {
         match (piece.form, &self.surface) {
             (Form::Triangle { corners, panel, share }, Surface::Panels(_, charge, functions)) => {
                 let own = &charge[panel as usize * functions..(panel as usize + 1) * functions];
                 let mut charges = vec![0.0; *functions];
-                for (y, weight) in quadrature::rule(degree).on(&corners) {
+                for (y, weight) in quadrature::rule(degree(piece.radius)).on(&corners) {
                     for (c, q) in charges.iter_mut().zip(own) {
                         *c = weight * share * q;
                     }
@@ -147,7 +164,7 @@ impl<'a> Pieces<'a> {
                 }
             }
             (Form::Rectangle { element, low, high }, Surface::Elements(elements)) => {
-                elements.points(element, low, high, degree, each);
+                elements.points(element, low, high, piece.reach.map(degree), each);
             }
             _ => {}
         }

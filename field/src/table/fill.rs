@@ -187,11 +187,13 @@ impl<'a> Filler<'a> {
             let far = distance - piece.radius > FAR * radius;
             let ratio = piece.radius / (distance - radius).max(f64::MIN_POSITIVE);
             if far && ratio <= LARGEST_PIECE {
-                self.pieces.points(&piece, rule_degree(ratio, self.accuracy), &mut |y, charges| {
+                let reach = (distance - radius).max(f64::MIN_POSITIVE);
+                let degree = |size: f64| rule_degree(size / reach, self.accuracy);
+                self.pieces.points(&piece, &degree, &mut |y, charges| {
                     gather.push(&((y - center) / radius), 1.0 / radius, charges);
                 });
             } else if far || piece.radius > radius {
-                pending.extend(self.pieces.quarters(&piece));
+                pending.extend(self.pieces.parts(&piece));
             } else {
                 left.push(piece);
             }
@@ -272,12 +274,14 @@ impl<'a> Filler<'a> {
         let mut gather = Gather::new(self.functions);
         let mut pending = near.to_vec();
         while let Some(piece) = pending.pop() {
-            let ratio = piece.radius / (piece.center - node).norm().max(f64::MIN_POSITIVE);
+            let distance = (piece.center - node).norm().max(f64::MIN_POSITIVE);
+            let ratio = piece.radius / distance;
             if ratio > LARGEST_PIECE {
-                pending.extend(self.pieces.quarters(&piece));
+                pending.extend(self.pieces.parts(&piece));
                 continue;
             }
-            self.pieces.points(&piece, rule_degree(ratio, self.accuracy), &mut |y, charges| {
+            let degree = |size: f64| rule_degree(size / distance, self.accuracy);
+            self.pieces.points(&piece, &degree, &mut |y, charges| {
                 gather.push(&((y - node) / length), 1.0 / length, charges);
             });
         }
