@@ -104,7 +104,7 @@ impl ElectrodeBasis {
             unknowns: solution.unknowns,
             assembly_seconds: solution.assembly_seconds,
             solve_seconds: solution.solve_seconds,
-            residual: 0.0,
+            residual: solution.residual,
             matrix_bytes: solution.matrix_bytes,
         };
         Self::shown(mesh, sources, ground, Arc::new(solution.charge), capacitance, induced, report)

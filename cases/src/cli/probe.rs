@@ -76,7 +76,7 @@ pub(super) fn probe(session: &Session, arguments: &ProbeArguments) -> Result<(),
         );
         return Err(Failure::usage(problem, "move the point"));
     }
-    let mut error_estimate = solution.error_estimate;
+    let mut error_estimate = solution.errors.worst();
     let planned = if arguments.table { Some(tabulated(session, &solution)?) } else { None };
     session.cache.write(&mut out, case, &solution, planned.as_ref().map(|(plan, tabulated)| (plan, tabulated)))?;
     let (driven, covered) = match planned {

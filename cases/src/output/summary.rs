@@ -68,8 +68,10 @@ pub struct SolveSummary {
     pub solver_reason: String,
     /// What the charges sit on: `galerkin`, `collocation` or `curved`.
     pub elements: &'static str,
-    /// Estimated relative error of field and capacitances.
+    /// Estimated relative error of the capacitances, against the largest.
     pub error_estimate: f64,
+    /// Estimated relative error of the unit fields in the trap region, against the strongest there of each.
+    pub field_error_estimate: f64,
     /// What the estimate is from.
     pub error_estimated_by: String,
     /// Largest error of the potential on the rows looked at, V per V.
@@ -202,7 +204,8 @@ impl SolveSummary {
             solution: if solution.kept { "kept" } else { "solved" },
             solver_reason: solution.choice.why.clone(),
             elements: solution.choice.elements.name(),
-            error_estimate: solution.error_estimate,
+            error_estimate: solution.errors.capacitance,
+            field_error_estimate: solution.errors.field,
             error_estimated_by: solution.estimated_by.clone(),
             residual: basis.report.residual,
             voltages_at_start: strengths[..electrodes].to_vec(),
@@ -297,6 +300,12 @@ impl TraceSummary {
     }
 }
 
+/// The errors of a solution, in words.
+fn about(solve: &SolveSummary) -> String {
+    let (capacitance, field) = (solve.error_estimate, solve.field_error_estimate);
+    format!("errors about {field:.0e} in the field, {capacitance:.0e} in the capacitances")
+}
+
 /// Capacitances are shown for up to so many electrodes; the rest is in the file.
 const SHOWN: usize = 8;
 
@@ -312,7 +321,7 @@ impl Summary {
         }
         if let Some(solve) = self.solve.as_ref().filter(|s| s.panels > 0) {
             let names = solve.electrodes.join(", ");
-            line("electrodes", format!("{names}: {} panels, error about {:.0e}", solve.panels, solve.error_estimate));
+            line("electrodes", format!("{names}: {} panels, {}", solve.panels, about(solve)));
             line("solver", format!("{}, {}: {}", solve.solver, solve.elements, solve.solver_reason));
             for (number, row) in capacitances(case, solve).into_iter().enumerate() {
                 line(if number == 0 { "capacitance" } else { "" }, row);

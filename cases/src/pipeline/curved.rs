@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use field::curved::{CurvedMesh, CurvedProblem, CurvedSolution, solve_to};
-use field::{ElectrodeBasis, Plane, Samples, Source};
+use field::{ElectrodeBasis, Errors, Plane, Samples, Source};
 use meshes::{Patch, SurfaceMesh, Vec3, patches};
 
 use super::choice::Solver;
@@ -34,14 +34,15 @@ impl Work<'_> {
         let refined = refined.map_err(|error| self.explained(error))?;
         let basis = ElectrodeBasis::from_curved(shown, sources.to_vec(), ground, refined.solution);
         self.solve_seconds += start.elapsed().as_secs_f64();
-        let error = refined.error;
-        if error > asked {
+        let errors = refined.errors;
+        if errors.worst() > asked {
+            let error = errors.worst();
             let (unknowns, most) = (basis.report.unknowns, self.case.field.max_panels);
             self.warn(format!(
                 "the field has an estimated error of {error:.1e} with {unknowns} unknowns; {asked:.0e} was asked. Raise field.max_panels (now {most}) to come nearer"
             ));
         }
-        Ok(self.done(basis, error, "a finer solution"))
+        Ok(self.done(basis, errors, "a finer solution"))
     }
 
     /// Largest number of unknowns of one matrix: what the case allows, and what fits in memory.
@@ -75,7 +76,7 @@ impl Work<'_> {
     }
 }
 
-/// The larger of two relative differences: of the capacitance matrices, against the largest entry, and of the unit fields at
+/// Two relative differences: of the capacitance matrices, against the largest entry, and of the unit fields at
 /// points, against the strongest of each.
 fn difference(
     fine: &CurvedSolution,
@@ -83,15 +84,15 @@ fn difference(
     points: &[Vec3],
     sources: &[Source],
     ground: Option<Plane>,
-) -> f64 {
+) -> Errors {
     let electrodes = fine.totals.len();
     let own = |solution: &CurvedSolution| -> Vec<Vec<f64>> {
         solution.totals.iter().map(|row| row[..electrodes].to_vec()).collect()
     };
     let (a, b) = (fine.sample(points), coarse.sample(points));
     let of_sources = |s: usize, p: &Vec3| sources[s].potential_and_gradient_above(ground.as_ref(), p).1;
-    let fields = field_difference(&a, &b, points, electrodes, sources.len(), &of_sources);
-    matrix_difference(&own(fine), &own(coarse)).max(fields)
+    let field = field_difference(&a, &b, points, electrodes, sources.len(), &of_sources);
+    Errors { capacitance: matrix_difference(&own(fine), &own(coarse)), field }
 }
 
 /// Largest difference of the unit fields, against the strongest of each; `own` is the field of a source itself.

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use field::influence::Testing;
-use field::{BasisField, BoundaryProblem, ElectrodeBasis, Samples, SolveError, Source};
+use field::{BasisField, BoundaryProblem, ElectrodeBasis, Errors, Samples, SolveError, Source};
 use meshes::{SurfaceMesh, SurfaceTree, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -21,9 +21,8 @@ pub struct Solution {
     pub basis: ElectrodeBasis,
     /// What solved for its charges, and why that.
     pub choice: Choice,
-    /// Estimated relative error: the larger of those of the capacitance matrix (against its largest entry) and of the unit
-    /// fields at points in the trap region (against the strongest of each), between two meshes.
-    pub error_estimate: f64,
+    /// Estimated errors.
+    pub errors: Errors,
     /// How the estimate was found.
     pub estimated_by: String,
     /// What was warned of on the way.
@@ -62,7 +61,7 @@ pub fn solve(case: &Case, source: &CaseSource, ready: &Ready, reporter: &dyn Rep
     let mut work = Work::new(case, source, ready, reporter);
     if case.electrodes.is_empty() {
         let basis = work.solve(&ready.mesh, false)?;
-        return Ok(work.done(basis, 0.0, "closed form"));
+        return Ok(work.done(basis, Errors::default(), "closed form"));
     }
     if work.choice.elements == Elements::Curved {
         return work.solve_curved();
@@ -75,14 +74,15 @@ pub fn solve(case: &Case, source: &CaseSource, ready: &Ready, reporter: &dyn Rep
         let imported = work.electrodes.any_imported();
         reporter.stage(&format!("solve {} panels", mesh.panels()));
         let basis = work.solve(&mesh, imported)?;
-        let (error, how) = if imported {
+        let (errors, how) = if imported {
             (work.error_from_groups(&basis), "groups of panels")
         } else {
             (work.error_from_coarser_mesh(&basis, before.take(), fineness)?, "a coarser mesh")
         };
+        let error = errors.worst();
         if error <= case.field.accuracy || pinned || imported || round == ROUNDS {
             work.warn_if_missed(error, mesh.panels());
-            return Ok(work.done(basis, error, how));
+            return Ok(work.done(basis, errors, how));
         }
         // Errors fall with the square of the panel size; more than needed, since the estimate is one and meshes come in steps.
         let mut finer = fineness * (1.3 * error / case.field.accuracy).sqrt().clamp(1.15, 2.5);
@@ -93,7 +93,7 @@ pub fn solve(case: &Case, source: &CaseSource, ready: &Ready, reporter: &dyn Rep
         }
         if finer <= 1.02 * fineness {
             work.warn_if_missed(error, basis.panels.len());
-            return Ok(work.done(basis, error, how));
+            return Ok(work.done(basis, errors, how));
         }
         fineness = finer;
         before = Some(basis);
@@ -246,7 +246,7 @@ impl<'a> Work<'a> {
         basis: &ElectrodeBasis,
         before: Option<ElectrodeBasis>,
         fineness: f64,
-    ) -> Result<f64, Failure> {
+    ) -> Result<Errors, Failure> {
         let ratio = |coarse: usize| (basis.panels.len() as f64 / coarse as f64).sqrt();
         let coarse = match before.filter(|before| ratio(before.panels.len()) > NEAREST) {
             Some(before) => before,
@@ -262,16 +262,19 @@ impl<'a> Work<'a> {
                 self.solve(&mesh, false)?
             }
         };
-        let difference = matrix_difference(&basis.capacitance.matrix, &coarse.capacitance.matrix)
-            .max(self.field_difference(basis, &coarse));
-        Ok(difference / (ratio(coarse.panels.len()).powi(2) - 1.0))
+        let difference = Errors {
+            capacitance: matrix_difference(&basis.capacitance.matrix, &coarse.capacitance.matrix),
+            field: self.field_difference(basis, &coarse),
+        };
+        Ok(difference.times(1.0 / (ratio(coarse.panels.len()).powi(2) - 1.0)))
     }
 
-    fn error_from_groups(&self, basis: &ElectrodeBasis) -> f64 {
-        basis.coarse.as_ref().map_or(f64::NAN, |coarse| {
+    fn error_from_groups(&self, basis: &ElectrodeBasis) -> Errors {
+        let error = basis.coarse.as_ref().map_or(f64::NAN, |coarse| {
             // Panels of an imported mesh do not shrink towards edges: first order.
             matrix_difference(&basis.capacitance.matrix, &coarse.matrix) / (coarse.size_ratio - 1.0)
-        })
+        });
+        Errors { capacitance: error, field: error }
     }
 
     /// Largest difference of the unit fields of two solutions at points of the trap region, against the strongest of each
@@ -304,15 +307,15 @@ impl<'a> Work<'a> {
         }
     }
 
-    pub(super) fn done(mut self, basis: ElectrodeBasis, error_estimate: f64, estimated_by: &str) -> Solution {
-        let tolerance = error_estimate.max(1e-12);
+    pub(super) fn done(mut self, basis: ElectrodeBasis, errors: Errors, estimated_by: &str) -> Solution {
+        let tolerance = errors.capacitance.max(1e-12);
         for defect in basis.capacitance.defects(tolerance) {
             self.warn(format!("the capacitance matrix is not what it must be: {defect}"));
         }
         Solution {
             basis,
             choice: self.choice.clone(),
-            error_estimate,
+            errors,
             estimated_by: estimated_by.to_owned(),
             warnings: self.warnings,
             mesh_seconds: self.mesh_seconds,

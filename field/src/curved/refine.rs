@@ -8,14 +8,15 @@ use super::element::{CurvedMesh, Element};
 use super::legendre::{MAX_ORDER, Transform};
 use super::solve::{CurvedProblem, CurvedSolution};
 use crate::boundary_problem::SolveError;
+use crate::errors::Errors;
 
 /// A solution whose error is known.
 #[derive(Clone, Debug)]
 pub struct Refined {
     /// The solution.
     pub solution: CurvedSolution,
-    /// Its largest error, relative, found from a better solution.
-    pub error: f64,
+    /// Its errors, found from a better solution.
+    pub errors: Errors,
     /// Unknowns of the better solution.
     pub judged_by: usize,
 }
@@ -44,8 +45,8 @@ impl Level {
 /// Largest number of solutions on the way to the accuracy.
 const ROUNDS: usize = 9;
 
-/// Solves on finer and finer meshes until the error of one is known to be below `accuracy`. `difference(fine, coarse)` is the
-/// relative error of the second if the first were exact; `begins` hears of each mesh before it is solved. `limit` is the largest number of unknowns of a sector.
+/// Solves on finer and finer meshes until the error of one is known to be below `accuracy`. `difference(fine, coarse)` tells
+/// the errors of the second if the first were exact; `begins` hears of each mesh before it is solved. `limit` is the largest number of unknowns of a sector.
 ///
 /// # Errors
 /// As [`CurvedProblem::solve`].
@@ -55,7 +56,7 @@ pub fn solve_to(
     electrode: &[u32],
     accuracy: f64,
     limit: usize,
-    difference: &dyn Fn(&CurvedSolution, &CurvedSolution) -> f64,
+    difference: &dyn Fn(&CurvedSolution, &CurvedSolution) -> Errors,
     begins: &dyn Fn(&CurvedMesh),
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<Refined, SolveError> {
@@ -78,21 +79,21 @@ pub fn solve_to(
         let solution = problem.solve(&mesh, 0.01 * accuracy, progress)?;
         let mut known = None;
         if let Some(coarse) = before {
-            let error = TRUST * difference(&solution, &coarse);
-            if error <= accuracy {
-                return Ok(Refined { solution: coarse, error, judged_by: solution.unknowns });
+            let errors = difference(&solution, &coarse).times(TRUST);
+            if errors.worst() <= accuracy {
+                return Ok(Refined { solution: coarse, errors, judged_by: solution.unknowns });
             }
-            known = Some(error);
+            known = Some(errors);
             if round == ROUNDS {
-                return Ok(Refined { solution, error, judged_by: 0 });
+                return Ok(Refined { solution, errors, judged_by: 0 });
             }
         }
         level = level.next();
         let elements = graded(patches, &vertices, refined(&solution, accuracy, known.is_some()), level.depth);
         let finer = CurvedMesh { elements, order: level.order, ..mesh };
-        if let Some(error) = known.filter(|_| finer.unknowns() / solution.symmetry > limit) {
+        if let Some(errors) = known.filter(|_| finer.unknowns() / solution.symmetry > limit) {
             // Nothing better can be had: the error of the coarser one bounds that of the better.
-            return Ok(Refined { solution, error, judged_by: 0 });
+            return Ok(Refined { solution, errors, judged_by: 0 });
         }
         mesh = finer;
         before = Some(solution);

@@ -46,6 +46,8 @@ pub struct CurvedSolution {
     pub symmetry: usize,
     /// The grounded plane below.
     pub ground: Option<Plane>,
+    /// Largest error of the potential at points that were looked at, V per V.
+    pub residual: f64,
     /// Bytes of the matrices.
     pub matrix_bytes: u64,
     /// Filling them, s.
@@ -121,8 +123,8 @@ impl CurvedProblem<'_> {
             .filter(|(_, part)| part.col_iter().any(|c| c.iter().any(|v| v.abs() > 1e-14)))
             .collect();
         let sectors: Vec<u32> = parts.iter().map(|(sector, _)| *sector).collect();
-        let matrices =
-            Assembly::new(mesh, &points, self.ground, accuracy).matrices(&symmetry, &sectors, &|f| progress(0.9 * f));
+        let assembly = Assembly::new(mesh, &points, self.ground, accuracy);
+        let matrices = assembly.matrices(&symmetry, &sectors, &|f| progress(0.9 * f));
         let assembled = std::time::Instant::now();
         let mut values = Mat::<f64>::zeros(points.len(), wanted.ncols());
         let (mut unknowns, mut matrix_bytes) = (0, 0);
@@ -150,7 +152,9 @@ impl CurvedProblem<'_> {
                 *total += weight * values[(p, c)];
             }
         }
+        let residual = residual(&assembly, &values, &wanted);
         Ok(CurvedSolution {
+            residual,
             charge: CurvedCharge::new(mesh.clone(), &values, accuracy),
             totals,
             unknowns,
@@ -161,6 +165,28 @@ impl CurvedProblem<'_> {
             solve_seconds: assembled.elapsed().as_secs_f64(),
         })
     }
+}
+
+/// Points at which the residual is looked at; each costs as much as a row of the matrix.
+const CHECKED: usize = 32;
+
+/// Largest relative error of the potentials at some points, each computed anew without symmetry.
+fn residual(assembly: &Assembly, values: &Mat<f64>, wanted: &Mat<f64>) -> f64 {
+    let n = values.nrows();
+    let rows: Vec<usize> = (0..n).step_by(n.div_ceil(CHECKED).max(1)).collect();
+    let largest = |c: usize| wanted.col(c).iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
+    let largest: Vec<f64> = (0..values.ncols()).map(largest).collect();
+    let of_row = |&target: &usize| {
+        let mut row = vec![0.0; n];
+        assembly.row(target, &mut row);
+        (0..values.ncols())
+            .map(|c| {
+                let potential: f64 = row.iter().zip(values.col(c).iter()).map(|(a, q)| a * q).sum();
+                (potential - wanted[(target, c)]).abs() / largest[c]
+            })
+            .fold(0.0, f64::max)
+    };
+    rows.par_iter().map(of_row).reduce(|| 0.0, f64::max)
 }
 
 /// Solves A x = b for the transpose of A, which is overwritten.

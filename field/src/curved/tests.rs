@@ -8,8 +8,10 @@ fn solved(shape: &Shape, accuracy: f64) -> Refined {
     let electrode = vec![0; patches.len()];
     let names = ["a".to_owned()];
     let problem = CurvedProblem { names: &names, sources: &[], ground: None, symmetric: true };
-    let difference =
-        |fine: &CurvedSolution, coarse: &CurvedSolution| (coarse.totals[0][0] / fine.totals[0][0] - 1.0).abs();
+    let difference = |fine: &CurvedSolution, coarse: &CurvedSolution| {
+        let capacitance = (coarse.totals[0][0] / fine.totals[0][0] - 1.0).abs();
+        crate::Errors { capacitance, field: 0.0 }
+    };
     let begins = |mesh: &CurvedMesh| eprint!(" {}^{}", mesh.elements.len(), mesh.order);
     solve_to(&problem, &patches, &electrode, accuracy, 8000, &difference, &begins, &|_| ()).unwrap()
 }
@@ -50,7 +52,7 @@ fn explore() {
             println!(
                 "{name} asked {accuracy:.0e} error {:.9} estimate {:.2e} unknowns {} symmetry {} judge {} {:.3} s (fill {:.3} solve {:.3})",
                 if exact == 1.0 { c } else { c / exact - 1.0 },
-                r.error,
+                r.errors.capacitance,
                 r.solution.unknowns,
                 r.solution.symmetry,
                 r.judged_by,
