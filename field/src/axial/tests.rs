@@ -102,3 +102,38 @@ fn errors_told_are_errors_made() {
         }
     }
 }
+
+#[test]
+fn shapes_with_corners() {
+    let shapes = [
+        ("annulus", Shape::Disc { radius: 1.0, hole_radius: 0.4, thickness: 0.0 }),
+        ("narrow annulus", Shape::Disc { radius: 1.0, hole_radius: 0.01, thickness: 0.0 }),
+        ("thick disc", Shape::Disc { radius: 1.0, hole_radius: 0.0, thickness: 0.2 }),
+        ("thin thick disc", Shape::Disc { radius: 1.0, hole_radius: 0.0, thickness: 0.01 }),
+        ("thick annulus", Shape::Disc { radius: 1.0, hole_radius: 0.4, thickness: 0.2 }),
+        ("closed cylinder", Shape::Cylinder { radius: 1.0, length: 2.0, caps: true }),
+        ("open cylinder", Shape::Cylinder { radius: 1.0, length: 2.0, caps: false }),
+        ("needle", Shape::Cylinder { radius: 0.01, length: 2.0, caps: true }),
+        ("rod", Shape::Rod { radius: 0.1, length: 2.0 }),
+        ("thick cap", Shape::EndCap { radius: 1.0, opening: 1.2, thickness: 0.05 }),
+        ("thick bowl", Shape::EndCap { radius: 1.0, opening: 2.5, thickness: 0.1 }),
+        ("hyperbolic ring", Shape::HyperbolicRing { r0: 1.0, z0: 0.7, extent: 2.0 }),
+        ("hyperbolic cap", Shape::HyperbolicCap { r0: 1.0, z0: 0.7, extent: 2.0 }),
+        ("thin torus", ring(1.0, 1e-4)),
+    ];
+    for (name, shape) in shapes {
+        let bodies = bodies(&[(shape, 0.0)]);
+        let problem = AxialProblem { bodies: &bodies, electrodes: 1, sources: &[], ground: None };
+        let (best, judge) = match problem.solve_with_judge(3e-11) { Ok(s) => s, Err(e) => { println!("{name}: {e}"); continue; } };
+        let exact = judge.capacitance.matrix.clone();
+        println!("{name}: {:.15} +- {:.1e} misfit {:.1e} {}", exact[0][0] * COULOMB, best.data.capacitance_error, best.data.misfit, best.unknowns());
+        for accuracy in [1e-2, 1e-3, 1e-5, 1e-7, 1e-9] {
+            let start = std::time::Instant::now();
+            let solution = solved(&bodies, accuracy);
+            let seconds = start.elapsed().as_secs_f64();
+            let (made, told) = ((solution.capacitance.matrix[0][0] / exact[0][0] - 1.0).abs(), solution.data.capacitance_error);
+            println!("   {accuracy:.0e}: made {made:.1e} told {told:.1e} ratio {:.2} misfit {:.1e} {} unknowns {:.1} ms",
+                told / made, solution.data.misfit, solution.unknowns(), 1e3 * seconds);
+        }
+    }
+}
