@@ -1,4 +1,7 @@
 //! Potentials that charges on elements cause at nodes: far by their nodes, near by cutting, on themselves through ln.
+//!
+//! Between its nodes the charge per parameter of an element is the ring's radius ρ times a polynomial: so it vanishes on the
+//! axis as it must. Were it the polynomial alone, a rest of 1e-10 there would be a field of 1e-10 over the distance.
 
 use pulp::Arch;
 use rayon::prelude::*;
@@ -84,9 +87,16 @@ pub(crate) fn apart(p: [f64; 2], q: [f64; 2]) -> f64 {
 struct Scratch {
     cells: Vec<Cell>,
     rings: Rings,
-    /// Parameter and weight of each ring.
+    /// Parameter and weight of each ring, its radius included.
     parameters: Vec<(f64, f64)>,
     values: Vec<f64>,
+}
+
+impl Scratch {
+    fn add(&mut self, ring: [f64; 2], u: f64, weight: f64) {
+        self.rings.push(ring);
+        self.parameters.push((u, weight * ring[0]));
+    }
 }
 
 /// Matrix of potentials (row-major, charge over metres) at all nodes for charges at all nodes.
@@ -167,15 +177,19 @@ impl Assembly<'_> {
             self.moments(e, point, own_u, scratch, moments);
             let transform = self.rules.transform(order);
             let entries = &mut row[nodes.first..nodes.first + order];
+            let mut potentials = [0.0; LARGEST_ORDER];
             for (moment, factors) in moments.iter().zip(transform.chunks_exact(order)) {
-                for (entry, factor) in entries.iter_mut().zip(factors) {
-                    *entry += sign * moment * factor;
+                for (potential, factor) in potentials.iter_mut().zip(factors) {
+                    *potential += moment * factor;
                 }
+            }
+            for ((entry, potential), place) in entries.iter_mut().zip(potentials).zip(&nodes.places) {
+                *entry += sign * potential / place[0];
             }
         }
     }
 
-    /// ∫ P_k(2u - 1) φ(u) du over an element, φ the potential at the point of a unit charge on the ring at u.
+    /// ∫ P_k(2u - 1) ρ(u) φ(u) du over an element, φ the potential at the point of a unit charge on the ring at u.
     fn moments(&self, e: usize, point: [f64; 2], own: Option<f64>, scratch: &mut Scratch, moments: &mut [f64]) {
         let element = &self.elements[e];
         scratch.cells.clear();
@@ -188,12 +202,12 @@ impl Assembly<'_> {
             Cell::WHOLE.cut(element, self.bodies, point, (APART, 0.0), &mut scratch.cells);
         }
         let rule = self.rules.rule(fine_nodes(element.order));
-        for cell in &scratch.cells {
+        for k in 0..scratch.cells.len() {
+            let cell = scratch.cells[k];
             let width = cell.to - cell.from;
             for (x, w) in rule.nodes.iter().zip(&rule.weights) {
                 let u = cell.from + width * x;
-                scratch.rings.push(element.at(self.bodies, u).0);
-                scratch.parameters.push((u, w * width));
+                scratch.add(element.at(self.bodies, u).0, u, w * width);
             }
         }
         scratch.rings.fill();
@@ -223,8 +237,8 @@ impl Assembly<'_> {
             for (x, w) in rule.nodes.iter().zip(&rule.weights) {
                 let power = x.powi(LOG_POWER - 1);
                 let place = (u + side * first * power * x).clamp(0.0, 1.0);
-                scratch.rings.push(element.at(self.bodies, place).0);
-                scratch.parameters.push((place, w * first * f64::from(LOG_POWER) * power));
+                let weight = w * first * f64::from(LOG_POWER) * power;
+                scratch.add(element.at(self.bodies, place).0, place, weight);
             }
             let mut done = first;
             while done < room {

@@ -30,7 +30,7 @@ pub struct Element {
     pub from: f64,
     /// v where it ends.
     pub to: f64,
-    /// Number of nodes; the charge per parameter is a polynomial of one degree less.
+    /// Number of nodes; the charge per parameter is ρ times a polynomial of one degree less.
     pub order: usize,
 }
 

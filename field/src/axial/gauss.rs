@@ -98,7 +98,7 @@ impl Rules {
         &self.rules[n]
     }
 
-    /// `k * n + j`: factor of the *charge* at node j (density times weight) in the coefficient of P_k(2u - 1) of the density.
+    /// `k * n + j`: factor of a polynomial's value at node j *times the weight* in its coefficient of P_k(2u - 1).
     /// Gauss's rule finds the coefficients of polynomials of degree n - 1 exactly.
     pub fn transform(&self, n: usize) -> &[f64] {
         &self.transforms[n]

@@ -131,17 +131,22 @@ impl AxialSolution {
         self.data.elements.iter().flat_map(places).collect()
     }
 
-    /// Legendre coefficients of the charge per parameter of every element, C: `first node of the element + k`.
+    /// Legendre coefficients of the charge per parameter over ρ of every element, C/m: `first node of the element + k`.
     pub(crate) fn coefficients(&self, charges: &[f64]) -> Vec<f64> {
         let mut all = Vec::with_capacity(charges.len());
         let mut first = 0;
         for element in &self.data.elements {
-            let n = element.order;
-            let transform = self.rules.transform(n);
-            all.extend((0..n).map(|k| (0..n).map(|j| transform[k * n + j] * charges[first + j]).sum::<f64>()));
-            first += n;
+            all.extend(self.coefficients_of(element, &charges[first..first + element.order]));
+            first += element.order;
         }
         all
+    }
+
+    fn coefficients_of(&self, element: &Element, charges: &[f64]) -> Vec<f64> {
+        let n = element.order;
+        let (nodes, transform) = (&self.rules.rule(n).nodes, self.rules.transform(n));
+        let values: Vec<f64> = nodes.iter().zip(charges).map(|(&u, q)| q / element.at(&self.bodies, u).0[0]).collect();
+        (0..n).map(|k| (0..n).map(|j| transform[k * n + j] * values[j]).sum()).collect()
     }
 
     /// Surface charge density of one unit solution at a place on a body, C/m² per V: `t` from 0 to 1 along a piece of its
@@ -158,11 +163,8 @@ impl AxialSolution {
                 && element.piece == piece
                 && let Some(u) = element.parameter(t)
             {
-                let n = element.order;
-                let transform = self.rules.transform(n);
-                let charges = &self.charges(function)[first..first + n];
-                let coefficients: Vec<f64> =
-                    (0..n).map(|k| (0..n).map(|j| transform[k * n + j] * charges[j]).sum()).collect();
+                let coefficients =
+                    self.coefficients_of(element, &self.charges(function)[first..first + element.order]);
                 return Some(density(element, &self.bodies, u, &coefficients));
             }
             first += element.order;
@@ -205,14 +207,14 @@ impl AxialSolution {
     }
 }
 
-/// Charge per area of an element whose charge per parameter has these Legendre coefficients.
+/// Charge per area of an element whose charge per parameter over ρ has these Legendre coefficients.
 pub(crate) fn density(element: &Element, bodies: &[AxialBody], u: f64, coefficients: &[f64]) -> f64 {
-    // On the axis and at an edge both the charge per parameter and the area per parameter vanish: a step beside it.
+    // At an edge the length per parameter vanishes: a step beside it.
     let u = u.clamp(1e-7, 1.0 - 1e-7);
-    let ([rho, _], d) = element.at(bodies, u);
+    let (_, d) = element.at(bodies, u);
     let mut values = [0.0; LARGEST_ORDER];
     let values = &mut values[..coefficients.len()];
     legendre(u, values);
     let charge: f64 = coefficients.iter().zip(values.iter()).map(|(a, b)| a * b).sum();
-    charge / (TAU * rho * d[0].hypot(d[1]))
+    charge / (TAU * d[0].hypot(d[1]))
 }

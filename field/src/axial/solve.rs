@@ -176,22 +176,22 @@ impl Level {
             .collect()
     }
 
-    /// A charge per parameter c P_k is a density c/(2πρ ds/du), whose potential on the spot is about c/(ρ k).
+    /// A charge per parameter c ρ P_k is a density c/(2π ds/du), whose potential on the spot is about c/k.
     fn find_indicators(&self, rules: &Rules) -> Vec<(f64, f64)> {
         let scales = self.scales();
         let indicator = |(element, nodes): (&Element, &Nodes)| {
             let order = element.order;
             let transform = rules.transform(order);
-            let rho = nodes.places.iter().map(|p| p[0]).fold(0.0, f64::max);
             let (mut worst, mut fall) = (0.0, 0.0);
             for (c, scale) in scales.iter().enumerate() {
                 let coefficient = |k: usize| -> f64 {
-                    let terms = (0..order).map(|j| transform[k * order + j] * self.charges[(nodes.first + j, c)]);
+                    let terms = (0..order)
+                        .map(|j| transform[k * order + j] * self.charges[(nodes.first + j, c)] / nodes.places[j][0]);
                     terms.sum::<f64>().abs()
                 };
                 let last = coefficient(order - 1).max(coefficient(order - 2));
                 let before = coefficient(order - 3).max(coefficient(order - 4));
-                let size = last / (rho * order as f64 * scale);
+                let size = last / (order as f64 * scale);
                 if size > worst {
                     worst = size;
                     fall = (last / before).sqrt().clamp(0.02, 0.99);
@@ -229,17 +229,18 @@ impl Level {
         for (c, scale) in self.scales().into_iter().enumerate() {
             let mut charges = vec![0.0; n];
             for ((element, nodes), &(parent, from, to)) in next.elements.iter().zip(&next.nodes).zip(parents) {
-                let (order, first) = (self.elements[parent].order, self.nodes[parent].first);
+                let (order, own) = (self.elements[parent].order, &self.nodes[parent]);
+                let value = |j: usize| self.charges[(own.first + j, c)] / own.places[j][0];
                 let transform = rules.transform(order);
                 let coefficients: Vec<f64> = (0..order)
-                    .map(|k| (0..order).map(|j| transform[k * order + j] * self.charges[(first + j, c)]).sum())
+                    .map(|k| (0..order).map(|j| transform[k * order + j] * value(j)).sum())
                     .collect();
                 let rule = rules.rule(element.order);
                 let mut values = vec![0.0; order];
                 for (k, (u, w)) in rule.nodes.iter().zip(&rule.weights).enumerate() {
                     legendre(from + (to - from) * u, &mut values);
                     let density: f64 = coefficients.iter().zip(&values).map(|(a, b)| a * b).sum();
-                    charges[nodes.first + k] = density * w * (to - from);
+                    charges[nodes.first + k] = density * nodes.places[k][0] * w * (to - from);
                 }
             }
             for (r, row) in next.matrix.chunks_exact(n).enumerate() {

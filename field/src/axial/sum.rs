@@ -40,8 +40,8 @@ const APART: f64 = 0.75;
 /// distance of the gradient.
 const ON_SURFACE: f64 = 1e-11;
 
-/// How far from a surface the gradient of a point on it is taken, on both sides, in lengths of the element: the mean is that
-/// on the surface to the square of it.
+/// How far from a surface the gradient of a point on it is taken, once and twice that, in lengths of the element: from there to
+/// the surface it is a straight line to the square of this.
 const BESIDE: f64 = 1e-6;
 
 /// Potential and gradient.
@@ -62,7 +62,7 @@ pub struct AxialSum {
     rings: Rings,
     /// V m: `channel * rings + ring`.
     charge: Vec<f64>,
-    /// Legendre coefficients of the charge per parameter, V m: `channel * nodes + first node + k`.
+    /// Legendre coefficients of the charge per parameter over ρ, V: `channel * nodes + first node + k`.
     coefficients: Vec<f64>,
     unknowns: usize,
     ground: Option<f64>,
@@ -216,13 +216,14 @@ impl AxialSum {
         let mut polynomials = [0.0; LARGEST_ORDER];
         for (i, &(e, u, weight)) in scratch.fine.iter().enumerate() {
             let (element, first) = (&self.elements[e], self.nodes[e].first);
-            scratch.rings.push(element.at(&self.bodies, u).0);
+            let ring = element.at(&self.bodies, u).0;
+            scratch.rings.push(ring);
             let polynomials = &mut polynomials[..element.order];
             legendre(u, polynomials);
             for c in 0..self.channels {
                 let coefficients = &self.coefficients[c * self.unknowns + first..][..element.order];
                 let density: f64 = coefficients.iter().zip(polynomials.iter()).map(|(a, b)| a * b).sum();
-                scratch.charge[c * n + i] = weight * density;
+                scratch.charge[c * n + i] = weight * ring[0] * density;
             }
         }
         scratch.rings.fill();
@@ -239,11 +240,12 @@ impl AxialSum {
         let step = BESIDE * self.nodes[e].length;
         let potentials: Vec<f64> = scratch.sums.iter().map(|s| s[0]).collect();
         let mut mean = vec![[0.0; 2]; self.channels];
-        for side in [step, -step] {
+        // On each side the straight line through two steps.
+        for (side, weight) in [(step, 1.0), (2.0 * step, -0.5), (-step, 1.0), (-2.0 * step, -0.5)] {
             let beside = [(place[0] + side * normal[0]).abs(), place[1] + side * normal[1]];
             self.in_half_plane(beside, scratch);
             for (mean, sum) in mean.iter_mut().zip(&scratch.sums) {
-                *mean = [mean[0] + 0.5 * sum[1], mean[1] + 0.5 * sum[2]];
+                *mean = [mean[0] + weight * sum[1], mean[1] + weight * sum[2]];
             }
         }
         for c in 0..self.channels {

@@ -137,3 +137,72 @@ fn shapes_with_corners() {
         }
     }
 }
+
+/// A field in closed form: potential and its derivatives along ρ and z.
+type Form = fn(f64, f64) -> [f64; 3];
+
+fn of_sphere(rho: f64, z: f64) -> [f64; 3] {
+    let r = rho.hypot(z);
+    [1.0 / r, -rho / r.powi(3), -z / r.powi(3)]
+}
+
+/// Disc of radius one at 1 V: φ = (2/π) arcsin(2/(l₁ + l₂)), l = √((ρ ± 1)² + z²); Jackson, problem 3.4 in another form.
+/// Near the disc by arccos: cos = √((1 - λ²)...) as in oblate coordinates, ζ = sinh μ: φ = (2/π) arccot ζ.
+fn of_disc(rho: f64, z: f64) -> [f64; 3] {
+    // ζ² = (s + √(s² + 4z²))/2, s = ρ² + z² - 1; for s < 0 by the other root, without cancellation.
+    let s = rho * rho + z * z - 1.0;
+    let root = s.hypot(2.0 * z);
+    let zeta2 = if s > 0.0 { 0.5 * (s + root) } else { 2.0 * z * z / (root - s) };
+    let zeta = zeta2.sqrt();
+    // ρ²/(1 + ζ²) + z²/ζ² = 1: ∂ζ/∂x from it. |∇ζ|: dζ/dz = z(1 + ζ²)/(ζ root), dζ/dρ = ρ ζ/root/... with root = ζ² + ξ².
+    let (by_rho, by_z) = (rho * zeta / root, z * (1.0 + zeta2) / (zeta * root));
+    let slope = -2.0 / PI / (1.0 + zeta2);
+    [2.0 / PI * (1.0_f64).atan2(zeta), slope * by_rho, slope * by_z]
+}
+
+#[test]
+fn fields_in_closed_form_far_near_and_on_the_axis() {
+    let forms: [(Shape, Form); 2] = [(sphere(1.0), of_sphere), (disc(1.0), of_disc)];
+    for (shape, form) in forms {
+        let solution = solved(&bodies(&[(shape.clone(), 0.0)]), 1e-10);
+        let sum = AxialSum::every(&solution, Axis::default());
+        let near = |d: f64| match shape {
+            Shape::Sphere { .. } => vec![[(1.0 + d) * 0.6, (1.0 + d) * 0.8], [0.0, 1.0 + d], [1.0 + d, 0.0], [1e-9, -1.0 - d]],
+            _ => vec![[0.3, d], [0.0, -d], [0.95, d], [0.999, -d], [1e-9, d]],
+        };
+        let mut sets = vec![(100.0, vec![[60.0, 80.0], [0.0, -100.0], [100.0, 0.0]]), (1.0, vec![[1.5, 0.7], [0.0, 2.0], [1e-7, 1.2], [0.3, 1.0]])];
+        for d in [0.3, 0.1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-9] {
+            sets.push((d, near(d)));
+        }
+        for (d, points) in sets {
+            let mut worst = [0.0_f64; 2];
+            for [rho, z] in points {
+                let s = sum.sum(&[Vec3::new(0.6 * rho, 0.8 * rho, z)]);
+                let [potential, along_rho, along_z] = form(rho, z);
+                let wanted = Vec3::new(0.6 * along_rho, 0.8 * along_rho, along_z);
+                worst[0] = worst[0].max((s[0] / potential - 1.0).abs());
+                worst[1] = worst[1].max((Vec3::new(s[1], s[2], s[3]) - wanted).norm() / wanted.norm());
+            }
+            println!("{d:.0e} {worst:?}");
+        }
+        let on: Vec<Vec3> = match shape { Shape::Sphere{..} => vec![Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.0, 0.0, 1.0), Vec3::new(1.0, 0.0, 0.0)], _ => vec![Vec3::new(0.5, 0.0, 0.0), Vec3::zeros(), Vec3::new(1.0,0.0,0.0), Vec3::new(0.999, 0.0, 0.0)] };
+        for p in on { println!("{p:?} {:?}", sum.sum(&[p])); }
+    }
+}
+
+#[test]
+fn speed() {
+    let bodies = bodies(&[(ring(1.0, 0.05), -1.0), (ring(1.0, 0.05), 1.0)]);
+    for accuracy in [1e-4, 1e-6, 1e-9] {
+        let solution = solved(&bodies, accuracy);
+        let sum = AxialSum::new(&solution, &[std::sync::Arc::from([1.0, 1.0].as_slice())], Axis::default());
+        let step = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_6];
+        for half in [0.5, 1.5] {
+        let points: Vec<Vec3> = (0..20000).map(|k| Vec3::from_fn(|i, _| 2.0 * half * ((k as f64 * step[i]).fract() - 0.5))).collect();
+        let start = std::time::Instant::now();
+        let sums = sum.sum(&points);
+        let seconds = start.elapsed().as_secs_f64();
+        println!("{accuracy:.0e} box {half}: {} rings, {:.0} ns a point, {:.2} ns a ring, {}", sum.rings(), seconds * 1e9 / 20000.0, seconds * 1e9 / 20000.0 / sum.rings() as f64, sums[0]);
+        }
+    }
+}
