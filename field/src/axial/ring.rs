@@ -1,5 +1,7 @@
 //! The thin ring of charge, many at a time: potential and gradient by the arithmetic-geometric mean, in vectors.
 
+use std::ops::Range;
+
 use pulp::{Arch, Simd, WithSimd};
 
 /// Rings whose numbers stand side by side: a multiple of every vector's width.
@@ -162,7 +164,9 @@ struct Sums<'a> {
     rings: &'a Rings,
     /// `channel * rings + ring`.
     charge: &'a [f64],
-    /// One where a ring counts, zero where it does not; empty where all count.
+    /// Which rings count, in groups.
+    groups: &'a [Range<usize>],
+    /// One where a ring counts all the same, zero where it does not; empty where all count.
     counted: &'a [f64],
     sums: &'a mut [[f64; 3]],
 }
@@ -181,8 +185,12 @@ impl WithSimd for Sums<'_> {
         // Rings in blocks that stay in registers' reach; for each block every channel.
         const BLOCK: usize = 16;
         let mut values = [[zero; 3]; BLOCK];
-        for first in (0..n).step_by(BLOCK) {
-            let block = first..(first + BLOCK).min(n);
+        let vectors = GROUP / S::F64_LANES;
+        let blocks = self.groups.iter().flat_map(|range| {
+            let end = vectors * range.end;
+            (vectors * range.start..end).step_by(BLOCK).map(move |first| first..(first + BLOCK).min(end))
+        });
+        for block in blocks {
             for (k, value) in block.clone().zip(&mut values) {
                 let (p, outward, upward) = ring::<S, true>(simd, rho, z, radius[k], height[k]);
                 *value = [p, outward, upward];
@@ -206,16 +214,17 @@ impl WithSimd for Sums<'_> {
     }
 }
 
-/// Adds potential, ∂/∂ρ and ∂/∂z of charged rings (whole groups) at (ρ, z) for every channel.
+/// Adds potential, ∂/∂ρ and ∂/∂z of charged rings at (ρ, z) for every channel: those of some groups, and of these those that
+/// are counted (all, if that is empty).
 pub(crate) fn add_sums(
     arch: Arch,
     at: [f64; 2],
     rings: &Rings,
     charge: &[f64],
-    counted: &[f64],
+    (groups, counted): (&[Range<usize>], &[f64]),
     sums: &mut [[f64; 3]],
 ) {
-    arch.dispatch(Sums { at, rings, charge, counted, sums });
+    arch.dispatch(Sums { at, rings, charge, groups, counted, sums });
 }
 
 #[cfg(test)]
@@ -231,7 +240,7 @@ mod tests {
         let mut charge = vec![0.0; GROUP];
         charge[0] = 1.0;
         let mut sums = [[0.0; 3]];
-        add_sums(Arch::new(), at, &rings, &charge, &[], &mut sums);
+        add_sums(Arch::new(), at, &rings, &charge, (std::slice::from_ref(&(0..1)), &[]), &mut sums);
         let mut alone = Vec::new();
         potentials(Arch::new(), at, &rings, &mut alone);
         assert!((alone[0] / sums[0][0] - 1.0).abs() < 1e-14, "{at:?}: {} {}", alone[0], sums[0][0]);

@@ -1,13 +1,14 @@
 //! The field of charges on generating curves, anywhere.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 use std::sync::Arc;
 
 use meshes::Vec3;
 use pulp::Arch;
 
 use super::AxialBody;
-use super::assembly::{LARGEST_ORDER, Nodes, far, fine_nodes};
+use super::assembly::{LARGEST_ORDER, Nodes, fine_nodes};
 use super::element::{Cell, Element};
 use super::gauss::{Rules, legendre};
 use super::ring::{self, GROUP, Rings};
@@ -29,8 +30,11 @@ impl Default for Axis {
     }
 }
 
-/// What an element's own nodes leave of its share of the potential, where they act as rings.
-const LEFT_FAR: f64 = 1e-11;
+/// What a rule may leave of an element's share of the potential.
+const LEFT: f64 = 1e-11;
+
+/// No rule is used nearer than that, in lengths of the element.
+const NEAREST: f64 = 0.6;
 
 /// Cells of a near element are summed from this distance on, in their lengths. Gradients lose a digit more than potentials
 /// (`assembly`), which 24 nodes have to spare.
@@ -62,6 +66,11 @@ pub struct AxialSum {
     rings: Rings,
     /// V m: `channel * rings + ring`.
     charge: Vec<f64>,
+    /// Distance from which on an element acts by the nodes of a finer rule, m.
+    finer_reach: Vec<f64>,
+    finer_groups: Vec<Range<usize>>,
+    finer_rings: Rings,
+    finer_charge: Vec<f64>,
     /// Legendre coefficients of the charge per parameter over ρ, V: `channel * nodes + first node + k`.
     coefficients: Vec<f64>,
     unknowns: usize,
@@ -99,11 +108,15 @@ impl AxialSum {
             }
             coefficients.extend(solution.coefficients(&all[..unknowns]));
         }
-        Self {
+        let mut sum = Self {
             axis,
             closed: bodies.iter().map(AxialBody::closed).collect(),
             bodies,
-            reach: elements.iter().zip(&nodes).map(|(e, n)| far(e.order, LEFT_FAR) * n.length).collect(),
+            reach: Vec::new(),
+            finer_reach: Vec::new(),
+            finer_groups: Vec::new(),
+            finer_rings: Rings::default(),
+            finer_charge: Vec::new(),
             elements,
             nodes,
             rings,
@@ -114,7 +127,75 @@ impl AxialSum {
             channels: weights.len(),
             rules,
             arch: Arch::new(),
+        };
+        sum.add_rules();
+        sum
+    }
+
+    /// The finer rules of all elements, and how near to it each rule serves.
+    fn add_rules(&mut self) {
+        let mut places = Vec::new();
+        for (e, element) in self.elements.iter().enumerate() {
+            let n = fine_nodes(element.order);
+            let rule = self.rules.rule(n);
+            let begin = places.len() / GROUP;
+            places.extend(rule.nodes.iter().zip(&rule.weights).map(|(u, w)| (e, *u, *w)));
+            self.finer_groups.push(begin..places.len() / GROUP);
+            let length = self.nodes[e].length;
+            self.reach.push(self.nearest(e, element.order) * length);
+            self.finer_reach.push(self.nearest(e, n) * length);
         }
+        let (mut rings, mut charge) = (Rings::default(), Vec::new());
+        self.charged(&places, &mut rings, &mut charge);
+        (self.finer_rings, self.finer_charge) = (rings, charge);
+    }
+
+    /// How near to an element a rule of n nodes serves, in lengths of the element. In a Bernstein ellipse of size r around it
+    /// the potential is smooth, and Gauss's rule leaves r^(k - 2n) of the term P_k of the charge (two degrees more for the
+    /// radius); the half axes of the ellipse are (r ± 1/r)/2, in half lengths.
+    fn nearest(&self, e: usize, n: usize) -> f64 {
+        let (order, first) = (self.elements[e].order, self.nodes[e].first);
+        let coefficients = |c: usize| &self.coefficients[c * self.unknowns + first..][..order];
+        let mut terms = [0.0_f64; LARGEST_ORDER];
+        for c in 0..self.channels {
+            let largest = coefficients(c).iter().fold(0.0_f64, |m, a| m.max(a.abs()));
+            if largest > 0.0 {
+                for (term, a) in terms.iter_mut().zip(coefficients(c)) {
+                    *term = term.max(a.abs() / largest);
+                }
+            }
+        }
+        let left = |r: f64| -> f64 {
+            let term = |(k, a): (usize, &f64)| a * r.powi(k as i32 + 2 - 2 * n as i32);
+            terms.iter().take(order).enumerate().map(term).fold(0.0, f64::max)
+        };
+        let mut r = 1.5;
+        while left(r) > LEFT && r < 1e3 {
+            r *= 1.05;
+        }
+        (0.25 * (r - 1.0 / r)).max(NEAREST)
+    }
+
+    /// Rings with their charges at places: element, parameter and weight.
+    fn charged(&self, places: &[(usize, f64, f64)], rings: &mut Rings, charge: &mut Vec<f64>) {
+        let n = places.len().next_multiple_of(GROUP);
+        rings.clear();
+        charge.clear();
+        charge.resize(n * self.channels, 0.0);
+        let mut polynomials = [0.0; LARGEST_ORDER];
+        for (i, &(e, u, weight)) in places.iter().enumerate() {
+            let (element, first) = (&self.elements[e], self.nodes[e].first);
+            let ring = element.at(&self.bodies, u).0;
+            rings.push(ring);
+            let polynomials = &mut polynomials[..element.order];
+            legendre(u, polynomials);
+            for c in 0..self.channels {
+                let coefficients = &self.coefficients[c * self.unknowns + first..][..element.order];
+                let density: f64 = coefficients.iter().zip(polynomials.iter()).map(|(a, b)| a * b).sum();
+                charge[c * n + i] = weight * ring[0] * density;
+            }
+        }
+        rings.fill();
     }
 
     /// Every unit solution as a channel.
@@ -172,62 +253,50 @@ impl AxialSum {
 
     /// Adds what the charges do at a point; the answer is the place on a surface that the point is on.
     fn add_charges(&self, point: [f64; 2], scratch: &mut Scratch) -> Option<(usize, f64)> {
-        let (mut touched, mut counted) = (None, true);
-        scratch.near.clear();
-        scratch.fine.clear();
-        for (e, (nodes, reach)) in self.nodes.iter().zip(&self.reach).enumerate() {
-            if nodes.distance(point) < *reach {
-                scratch.near.push(e);
+        let mut touched = None;
+        let Scratch { sums, counted, cells, finer, fine, rings, charge } = scratch;
+        fine.clear();
+        finer.clear();
+        counted.clear();
+        let mut others = 0;
+        for (e, (nodes, element)) in self.nodes.iter().zip(&self.elements).enumerate() {
+            let distance = nodes.distance(point);
+            if distance >= self.reach[e] {
+                continue;
+            }
+            if counted.is_empty() {
+                counted.resize(self.rings.radius.len(), 1.0);
+            }
+            counted[nodes.first..][..element.order].fill(0.0);
+            others += 1;
+            if distance >= self.finer_reach[e] {
+                finer.push(self.finer_groups[e].clone());
+                continue;
+            }
+            cells.clear();
+            let shortest = ON_SURFACE * nodes.length;
+            if let Some(u) = Cell::WHOLE.cut(element, &self.bodies, point, (APART, shortest), cells) {
+                touched = Some((e, u));
+            }
+            let rule = self.rules.rule(fine_nodes(element.order));
+            for cell in cells.iter() {
+                let width = cell.to - cell.from;
+                fine.extend(rule.nodes.iter().zip(&rule.weights).map(|(x, w)| (e, cell.from + width * x, w * width)));
             }
         }
-        if !scratch.near.is_empty() {
-            counted = false;
-            scratch.counted.clear();
-            scratch.counted.resize(self.rings.radius.len(), 1.0);
-            for &e in &scratch.near {
-                scratch.counted[self.nodes[e].first..][..self.elements[e].order].fill(0.0);
-                scratch.cells.clear();
-                let shortest = ON_SURFACE * self.nodes[e].length;
-                let (element, cells) = (&self.elements[e], &mut scratch.cells);
-                if let Some(u) = Cell::WHOLE.cut(element, &self.bodies, point, (APART, shortest), cells) {
-                    touched = Some((e, u));
-                }
-                let rule = self.rules.rule(fine_nodes(element.order));
-                for cell in &scratch.cells {
-                    let width = cell.to - cell.from;
-                    for (x, w) in rule.nodes.iter().zip(&rule.weights) {
-                        scratch.fine.push((e, cell.from + width * x, w * width));
-                    }
-                }
-            }
-            self.add_fine(point, scratch);
+        let groups = |rings: &Rings| 0..rings.radius.len() / GROUP;
+        if others < self.elements.len() {
+            let all = groups(&self.rings);
+            ring::add_sums(self.arch, point, &self.rings, &self.charge, (&[all], counted), sums);
         }
-        let counted: &[f64] = if counted { &[] } else { &scratch.counted };
-        ring::add_sums(self.arch, point, &self.rings, &self.charge, counted, &mut scratch.sums);
+        if !finer.is_empty() {
+            ring::add_sums(self.arch, point, &self.finer_rings, &self.finer_charge, (finer, &[]), sums);
+        }
+        if !fine.is_empty() {
+            self.charged(fine, rings, charge);
+            ring::add_sums(self.arch, point, rings, charge, (&[groups(rings)], &[]), sums);
+        }
         touched
-    }
-
-    /// Adds the rings of near elements, with charges from the polynomials.
-    fn add_fine(&self, point: [f64; 2], scratch: &mut Scratch) {
-        let n = scratch.fine.len().next_multiple_of(GROUP);
-        scratch.rings.clear();
-        scratch.charge.clear();
-        scratch.charge.resize(n * self.channels, 0.0);
-        let mut polynomials = [0.0; LARGEST_ORDER];
-        for (i, &(e, u, weight)) in scratch.fine.iter().enumerate() {
-            let (element, first) = (&self.elements[e], self.nodes[e].first);
-            let ring = element.at(&self.bodies, u).0;
-            scratch.rings.push(ring);
-            let polynomials = &mut polynomials[..element.order];
-            legendre(u, polynomials);
-            for c in 0..self.channels {
-                let coefficients = &self.coefficients[c * self.unknowns + first..][..element.order];
-                let density: f64 = coefficients.iter().zip(polynomials.iter()).map(|(a, b)| a * b).sum();
-                scratch.charge[c * n + i] = weight * ring[0] * density;
-            }
-        }
-        scratch.rings.fill();
-        ring::add_sums(self.arch, point, &scratch.rings, &scratch.charge, &[], &mut scratch.sums);
     }
 
     /// Puts the gradient on a surface in place: the mean of both sides, and on a closed body half the jump more, -2π σ/(4πε0)
@@ -265,9 +334,10 @@ impl AxialSum {
 #[derive(Default)]
 struct Scratch {
     sums: Vec<[f64; 3]>,
-    near: Vec<usize>,
     counted: Vec<f64>,
     cells: Vec<Cell>,
+    /// Groups of finer rings that count.
+    finer: Vec<Range<usize>>,
     /// Element, parameter and weight of each ring of a near element.
     fine: Vec<(usize, f64, f64)>,
     rings: Rings,
