@@ -116,12 +116,8 @@ impl Assembly<'_> {
         let targets: Vec<(usize, usize)> =
             self.nodes.iter().enumerate().flat_map(|(e, nodes)| (0..nodes.places.len()).map(move |k| (e, k))).collect();
         let fresh = || {
-            let scratch = Scratch {
-                cells: Vec::new(),
-                rings: Rings::default(),
-                parameters: Vec::new(),
-                values: Vec::new(),
-            };
+            let scratch =
+                Scratch { cells: Vec::new(), rings: Rings::default(), parameters: Vec::new(), values: Vec::new() };
             (scratch, [0.0; LARGEST_ORDER], Rings::default())
         };
         matrix.par_chunks_mut(n.max(1)).zip(targets).with_min_len(8).for_each_init(

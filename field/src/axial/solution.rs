@@ -163,8 +163,7 @@ impl AxialSolution {
                 && element.piece == piece
                 && let Some(u) = element.parameter(t)
             {
-                let coefficients =
-                    self.coefficients_of(element, &self.charges(function)[first..first + element.order]);
+                let coefficients = self.coefficients_of(element, &self.charges(function)[first..first + element.order]);
                 return Some(density(element, &self.bodies, u, &coefficients));
             }
             first += element.order;

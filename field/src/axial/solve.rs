@@ -85,16 +85,6 @@ impl AxialProblem<'_> {
             let judge = next.solution(self);
             let error = found.difference(&judge).max(SMALLEST_ERROR);
             best = best.min(error.max(misfit));
-            if std::env::var("AXIAL_TRACE").is_ok() {
-                eprintln!(
-                    "  {} elements {} unknowns: indicator {:.1e} error {error:.1e} misfit {misfit:.1e} judge {:.1e} C {:.15}",
-                    level.elements.len(),
-                    level.charges.nrows(),
-                    level.indicator(),
-                    next.indicator(),
-                    found.capacitance.matrix[0][0] * COULOMB,
-                );
-            }
             if let Some((earlier, misfit)) = waiting.take() {
                 return Ok(self.judged(earlier, misfit, judge));
             }
@@ -232,9 +222,8 @@ impl Level {
                 let (order, own) = (self.elements[parent].order, &self.nodes[parent]);
                 let value = |j: usize| self.charges[(own.first + j, c)] / own.places[j][0];
                 let transform = rules.transform(order);
-                let coefficients: Vec<f64> = (0..order)
-                    .map(|k| (0..order).map(|j| transform[k * order + j] * value(j)).sum())
-                    .collect();
+                let coefficients: Vec<f64> =
+                    (0..order).map(|k| (0..order).map(|j| transform[k * order + j] * value(j)).sum()).collect();
                 let rule = rules.rule(element.order);
                 let mut values = vec![0.0; order];
                 for (k, (u, w)) in rule.nodes.iter().zip(&rule.weights).enumerate() {
@@ -266,9 +255,8 @@ impl Level {
             (0..electrodes).map(|i| (0..electrodes).map(|k| on_electrode(i, k)).collect()).collect();
         let columns = self.charges.ncols();
         let induced = (0..electrodes).map(|i| (electrodes..columns).map(|k| on_electrode(i, k)).collect()).collect();
-        let flat = (0..columns)
-            .flat_map(|c| (0..self.charges.nrows()).map(move |r| self.charges[(r, c)] / COULOMB))
-            .collect();
+        let flat =
+            (0..columns).flat_map(|c| (0..self.charges.nrows()).map(move |r| self.charges[(r, c)] / COULOMB)).collect();
         AxialSolution::new(
             problem.bodies,
             self.elements.clone(),

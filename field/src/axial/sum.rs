@@ -319,11 +319,8 @@ impl AxialSum {
         }
         for c in 0..self.channels {
             let coefficients = &self.coefficients[c * self.unknowns + self.nodes[e].first..][..element.order];
-            let jump = if self.closed[element.body] {
-                -TAU * density(element, &self.bodies, u, coefficients)
-            } else {
-                0.0
-            };
+            let jump =
+                if self.closed[element.body] { -TAU * density(element, &self.bodies, u, coefficients) } else { 0.0 };
             let [along_rho, along_z] = mean[c];
             scratch.sums[c] = [potentials[c], along_rho + jump * normal[0], along_z + jump * normal[1]];
         }
