@@ -24,8 +24,10 @@ pub struct Element {
     pub edge: f64,
     /// Curve parameter at v = 1.
     pub far: f64,
-    /// How many times the parameter counts at the edge.
+    /// See above.
     pub power: u32,
+    /// At the edge the charge has terms that the power does not make smooth.
+    pub rough: bool,
     /// v where the element begins.
     pub from: f64,
     /// v where it ends.
@@ -69,6 +71,11 @@ impl Element {
         [-dz / length, sign * drho / length]
     }
 
+    /// Whether it ends at a rough edge and is too short for more.
+    pub(crate) fn beyond_resolution(&self) -> bool {
+        self.rough && self.from == 0.0 && self.to.powi(self.power as i32) < SHORTEST
+    }
+
     /// Its two halves.
     pub fn halves(&self) -> [Self; 2] {
         let middle = 0.5 * (self.from + self.to);
@@ -82,23 +89,35 @@ const SMOOTH: f64 = 1e-6;
 /// Power for joints at which the charge has terms that no power makes smooth: jumps of curvature (s ln s) and odd angles.
 const ROUGH: u32 = 3;
 
-/// Power of the substitution at the beginning of piece k (or, for k = number of pieces, at the end of the last).
-fn power_at(profile: &Profile, k: usize) -> u32 {
+/// Part of a piece below which nothing is resolved at rough edges. Elements shrink towards them by a factor of eight from
+/// level to level, and their charge with them; but at an odd angle the potential at distance s is found to some power of s
+/// only, and where s is rounding to nothing at all.
+const SHORTEST: f64 = 1e-6;
+
+/// Power of the substitution at the beginning of piece k (or, for k = number of pieces, at the end of the last), and whether
+/// it leaves the charge rough.
+fn power_at(profile: &Profile, k: usize) -> (u32, bool) {
+    let rough = (ROUGH, true);
     match profile.joint(k) {
-        Joint::Axis => 1,
-        Joint::Free => 2,
+        // Smooth across the axis, or the tip of a cone.
+        Joint::Axis => {
+            let n = profile.curves.len();
+            let (_, d) = if k < n { profile.curves[k].at(0.0) } else { profile.curves[n - 1].at(1.0) };
+            if d[1].abs() > SMOOTH * d[0].abs() { rough } else { (1, false) }
+        }
+        Joint::Free => (2, false),
         Joint::Edge { vacuum } if (vacuum - PI).abs() < SMOOTH => {
             let n = profile.curves.len();
             let (before, after) = (&profile.curves[(k + n - 1) % n], &profile.curves[k % n]);
             let (one, two) = (curvature(before, 1.0), curvature(after, 0.0));
-            if (one - two).abs() > 1e-2 * one.abs().max(two.abs()) { ROUGH } else { 1 }
+            if (one - two).abs() > 1e-2 * one.abs().max(two.abs()) { rough } else { (1, false) }
         }
         Joint::Edge { vacuum } => {
             let whole = |power: u32| {
                 let x = f64::from(power) * PI / vacuum;
                 (x - x.round()).abs() < 1e-6 && x > 0.5
             };
-            (1..=4).find(|&power| whole(power)).unwrap_or(ROUGH)
+            (1..=4).find(|&power| whole(power)).map_or(rough, |power| (power, false))
         }
     }
 }
@@ -119,19 +138,20 @@ pub(crate) fn coarsest(bodies: &[AxialBody], order: usize) -> Vec<Element> {
     for (b, body) in bodies.iter().enumerate() {
         let n = body.profile.curves.len();
         for piece in 0..n {
-            let element = |edge: f64, far: f64, power: u32| Element {
+            let element = |edge: f64, far: f64, (power, rough): (u32, bool)| Element {
                 body: b,
                 piece,
                 edge,
                 far,
                 power,
+                rough,
                 from: 0.0,
                 to: 1.0,
                 order,
             };
             match (power_at(&body.profile, piece), power_at(&body.profile, piece + 1)) {
-                (power, 1) => elements.push(element(0.0, 1.0, power)),
-                (1, power) => elements.push(element(1.0, 0.0, power)),
+                (power, (1, _)) => elements.push(element(0.0, 1.0, power)),
+                ((1, _), power) => elements.push(element(1.0, 0.0, power)),
                 (first, last) => elements.extend([element(0.0, 0.5, first), element(1.0, 0.5, last)]),
             }
         }

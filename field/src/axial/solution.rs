@@ -209,7 +209,7 @@ impl AxialSolution {
 /// Charge per area of an element whose charge per parameter over ρ has these Legendre coefficients.
 pub(crate) fn density(element: &Element, bodies: &[AxialBody], u: f64, coefficients: &[f64]) -> f64 {
     // At an edge the length per parameter vanishes: a step beside it.
-    let u = u.clamp(1e-7, 1.0 - 1e-7);
+    let u = if element.power > 1 { u.max(1e-7) } else { u };
     let (_, d) = element.at(bodies, u);
     let mut values = [0.0; LARGEST_ORDER];
     let values = &mut values[..coefficients.len()];

@@ -303,8 +303,6 @@ impl AxialSum {
     /// along the normal.
     fn on_surface(&self, e: usize, u: f64, scratch: &mut Scratch) {
         let element = &self.elements[e];
-        // At an edge the normal and the charge are those a step beside it.
-        let u = u.clamp(1e-7, 1.0 - 1e-7);
         let (place, normal) = (element.at(&self.bodies, u).0, element.normal(&self.bodies, u));
         let step = BESIDE * self.nodes[e].length;
         let potentials: Vec<f64> = scratch.sums.iter().map(|s| s[0]).collect();

@@ -132,6 +132,35 @@ fn turned(corners: &[[f64; 2]], closed: bool) -> AxialBody {
 }
 
 #[test]
+fn narrow_gaps_are_resolved() {
+    // Equal spheres: c11 = a sinh μ Σ 1/sinh((2n + 1)μ), c12 = -a sinh μ Σ 1/sinh(2nμ), cosh μ = d/2a. Smythe, section 5.082.
+    for gap in [1e-2_f64, 1e-4, 1e-6] {
+        let mu = (gap + 0.25 * gap * gap).sqrt().asinh();
+        let sum = |first: i32| -> f64 {
+            let term = |n: i32| mu.sinh() / (f64::from(2 * n + first) * mu).sinh();
+            (0..200_000).map(term).take_while(|t| *t > 1e-18).sum()
+        };
+        let (c11, c12) = (sum(1), -sum(2));
+        let exact = [vec![c11, c12], vec![c12, c11]];
+        let bodies = bodies(&[(sphere(1.0), 0.0), (sphere(1.0), 2.0 + gap)]);
+        for accuracy in [1e-3, 1e-6, 1e-8] {
+            let solution = solved(&bodies, accuracy);
+            let (made, told) = (error(&solution, &exact), solution.data.capacitance_error);
+            println!("{gap:.0e} to {accuracy:.0e}: {} unknowns, {made:.1e} {told:.1e}", solution.unknowns());
+            // The gap itself is rounded, to 1e-16 over its width.
+            assert!(
+                made < told * TOLD + 1e-16 / gap + 1e-12 && told <= accuracy,
+                "{gap:e}: made {made:e}, told {told:e}"
+            );
+        }
+    }
+    // A shell in a shell: one over the gap.
+    let bodies = bodies(&[(sphere(0.999), 0.0), (sphere(1.0), 0.0)]);
+    let c = solved(&bodies, 1e-8).capacitance.matrix[0][0] * COULOMB;
+    assert!((c / 999.0 - 1.0).abs() < 1e-10, "{c}");
+}
+
+#[test]
 fn edges_and_corners_converge() {
     let of = |shape: Shape| body(&shape, 0, 0.0);
     let shapes = [
@@ -156,7 +185,7 @@ fn edges_and_corners_converge() {
     for (name, body) in shapes {
         let bodies = [body];
         let start = std::time::Instant::now();
-        let (finest, judge) = problem(&bodies).solve_with_judge(1e-10).unwrap();
+        let (finest, judge) = problem(&bodies).solve_with_judge(1e-9).unwrap();
         println!(
             "{name}: {:.14} m over 4πε0, {} unknowns, {:.0} ms",
             judge.capacitance.matrix[0][0] * COULOMB,
@@ -404,9 +433,12 @@ fn a_kept_solution_is_the_solution() {
     let (solution, judge) = problem(&bodies).solve_with_judge(1e-5).unwrap();
     let kept = serde_json::to_string(&solution.data).unwrap();
     let restored = AxialSolution::restored(&bodies, serde_json::from_str(&kept).unwrap()).unwrap();
-    assert_eq!(restored.data, solution.data);
+    assert_eq!(restored.data.elements, solution.data.elements);
+    // JSON may round the last bit.
+    let close = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-15 * b.abs();
+    assert!(restored.data.charges.iter().zip(&solution.data.charges).all(close));
     let points = [Vec3::new(0.3, 0.2, 0.1), Vec3::new(0.0, 0.5, -0.69)];
-    assert!(restored.difference_at(&solution, &points).iter().all(|d| d.potential == 0.0 && d.gradient == 0.0));
+    assert!(restored.difference_at(&solution, &points).iter().all(|d| d.potential < 1e-14 && d.gradient < 1e-13));
     // The field's error is of the size of that on the surface.
     let differences = solution.difference_at(&judge, &points);
     assert!(
@@ -455,10 +487,10 @@ fn what_cannot_be_solved_is_said() {
     assert_eq!(tell(&[point], 1, &[], None), AxialError::Degenerate { body: 0, piece: 0 });
     let beyond = turned(&[[1.0, 0.0], [-1.0, 0.0]], false);
     assert_eq!(tell(&[beyond], 1, &[], None), AxialError::Degenerate { body: 0, piece: 0 });
-    // Two spheres that cut each other, and one twice.
-    let crossed = bodies(&[(sphere(1.0), 0.0), (sphere(1.0), 1.0)]);
+    // A sphere twice, and spheres that cut each other.
     let twice = bodies(&[(sphere(1.0), 0.0), (sphere(1.0), 0.0)]);
-    for bodies in [crossed, twice] {
+    let crossed = bodies(&[(sphere(1.0), 0.0), (sphere(1.0), 1.0)]);
+    for bodies in [twice, crossed] {
         let error = tell(&bodies, 2, &[], None);
         println!("{error}");
         assert!(matches!(error, AxialError::Accuracy { .. } | AxialError::Singular), "{error}");
