@@ -338,3 +338,47 @@ struct Scratch {
     rings: Rings,
     charge: Vec<f64>,
 }
+
+#[cfg(test)]
+mod tests {
+    use meshes::{Shape, profile::revolved};
+
+    use super::*;
+    use crate::axial::AxialProblem;
+
+    #[test]
+    fn rules_leave_what_they_may() {
+        let shapes = [
+            Shape::Ring { radius: 1.0, wire_radius: 0.05 },
+            Shape::Disc { radius: 0.7, hole_radius: 0.0, thickness: 0.0 },
+            Shape::Cylinder { radius: 0.3, length: 0.5, caps: true },
+        ];
+        let body = |(k, shape): (usize, &Shape)| {
+            let profile = revolved(shape).unwrap().swap_remove(0).profile;
+            AxialBody { profile, electrode: k, height: 0.8 * k as f64, flipped: false }
+        };
+        let bodies: Vec<AxialBody> = shapes.iter().enumerate().map(body).collect();
+        for accuracy in [1e-2, 1e-5, 1e-9] {
+            let problem = AxialProblem { bodies: &bodies, electrodes: 3, sources: &[], ground: None };
+            let solution = problem.solve(accuracy).unwrap();
+            let sum = AxialSum::every(&solution, Axis::default());
+            // Every element cut, however far.
+            let mut cut = AxialSum::every(&solution, Axis::default());
+            cut.reach.fill(f64::INFINITY);
+            cut.finer_reach.fill(f64::INFINITY);
+            let (mut potential, mut gradient) = (0.0_f64, 0.0_f64);
+            for k in 0..400 {
+                let u = |i: usize| (f64::from(k) * [0.819_172_513_4, 0.671_043_606_7, 0.549_700_477_9][i]).fract();
+                let p = [Vec3::new(3.0 * u(0) - 1.5, 3.0 * u(1) - 1.5, 4.0 * u(2) - 1.0)];
+                for (a, b) in sum.sum(&p).chunks_exact(4).zip(cut.sum(&p).chunks_exact(4)) {
+                    let slope = |s: &[f64]| Vec3::new(s[1], s[2], s[3]);
+                    potential = potential.max((a[0] - b[0]).abs());
+                    gradient = gradient.max((slope(a) - slope(b)).norm() / slope(b).norm().max(1.0));
+                }
+            }
+            println!("{accuracy:e}: {potential:.1e} {gradient:.1e}");
+            // Of 1 V; the gradient loses a digit beside an element.
+            assert!(potential < 1e-10 && gradient < 1e-8, "{accuracy:e}: {potential:e} {gradient:e}");
+        }
+    }
+}
