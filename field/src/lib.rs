@@ -52,6 +52,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod axial;
 pub mod basis_field;
 pub mod boundary_problem;
 pub mod capacitance;
