@@ -1,0 +1,101 @@
+//! Everything here against what it replaces: direct sums, the dense matrix, the sum over all panels.
+
+use faer::Mat;
+use meshes::Vec3;
+
+use super::points::Points;
+
+/// Numbers from 0 to 1 without relation to each other (a permuted congruential generator).
+pub(super) fn random(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(1);
+    move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let word = ((state >> 18) ^ state) >> 27;
+        let turned = (word as u32).rotate_right((state >> 59) as u32);
+        f64::from(turned) / 4_294_967_296.0
+    }
+}
+
+pub(super) fn direction(random: &mut impl FnMut() -> f64) -> Vec3 {
+    let (z, turn) = (2.0 * random() - 1.0, std::f64::consts::TAU * random());
+    let across = (1.0 - z * z).sqrt();
+    Vec3::new(across * turn.cos(), across * turn.sin(), z)
+}
+
+pub(super) fn clouds(n: usize) -> Vec<(&'static str, Vec<Vec3>)> {
+    let mut r = random(1);
+    let cube = (0..n).map(|_| Vec3::new(r(), r(), r())).collect();
+    let sphere = (0..n).map(|_| direction(&mut r)).collect();
+    // A sheet whose points crowd towards one edge and one corner, over some five decades.
+    let sheet = (0..n).map(|_| Vec3::new(10_f64.powf(-4.0 * r()), 10_f64.powf(-2.0 * r()), 0.0)).collect();
+    let far = (0..n)
+        .map(|i| {
+            let d = direction(&mut r);
+            if i % 3 == 0 { d * (1e-3 * r()) } else { Vec3::new(30.0, 4.0, -5.0) + d * r() }
+        })
+        .collect();
+    vec![("cube", cube), ("sphere", sphere), ("graded sheet", sheet), ("two clusters", far)]
+}
+
+/// Σ q/r and its gradient at some targets.
+pub(super) fn direct(sources: &[Vec3], charges: &[f64], target: &Vec3) -> [f64; 4] {
+    let mut sum = [0.0; 4];
+    for (y, q) in sources.iter().zip(charges) {
+        let d = target - y;
+        let r = d.norm();
+        if r > 0.0 {
+            sum[0] += q / r;
+            for k in 0..3 {
+                sum[k + 1] -= q * d[k] / (r * r * r);
+            }
+        }
+    }
+    sum
+}
+
+/// Errors of potentials and of gradients on every `stride`th target, root mean square over that of the exact ones.
+pub(super) fn errors(sources: &[Vec3], charges: &Mat<f64>, targets: &[Vec3], found: &Mat<f64>, stride: usize) -> [f64; 2] {
+    let mut worst = [0.0_f64; 2];
+    for c in 0..charges.ncols() {
+        let q: Vec<f64> = charges.col(c).iter().copied().collect();
+        let (mut error, mut size) = ([0.0; 2], [0.0; 2]);
+        for t in (0..targets.len()).step_by(stride) {
+            let exact = direct(sources, &q, &targets[t]);
+            for k in 0..4 {
+                let kind = usize::from(k > 0);
+                error[kind] += (found[(t, 4 * c + k)] - exact[k]).powi(2);
+                size[kind] += exact[k].powi(2);
+            }
+        }
+        for kind in 0..2 {
+            worst[kind] = worst[kind].max((error[kind] / size[kind]).sqrt());
+        }
+    }
+    worst
+}
+
+/// One column of positive charges, one of random signs, one of zeros.
+pub(super) fn some_charges(n: usize) -> Mat<f64> {
+    let mut r = random(7);
+    let mut charges = Mat::from_fn(n, 2, |_, _| r());
+    for i in 0..n {
+        charges[(i, 1)] = charges[(i, 1)] - 0.5;
+    }
+    charges
+}
+
+#[test]
+fn points_are_as_good_as_asked() {
+    let n = 6000;
+    for (name, points) in clouds(n) {
+        let charges = some_charges(n);
+        for accuracy in [1e-2, 1e-4, 1e-6, 1e-8, 1e-10] {
+            let sum = Points::new(&points, &points, accuracy).unwrap();
+            let found = sum.potentials_and_gradients(charges.as_ref());
+            let [potential, gradient] = errors(&points, &charges, &points, &found, 17);
+            println!("{name:15} {accuracy:.0e}: potential {potential:.1e}, gradient {gradient:.1e}");
+            // What was asked is what is promised.
+            assert!(potential < accuracy && gradient < accuracy, "{name} at {accuracy:e}");
+        }
+    }
+}
