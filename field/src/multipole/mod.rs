@@ -1,6 +1,9 @@
 //! Sums over very many charges in nearly linear time: the fast multipole method, and what is built on it.
 
+mod close;
+mod clusters;
 mod near;
+mod operator;
 mod points;
 mod solid;
 #[cfg(test)]
@@ -8,4 +11,5 @@ mod tests;
 mod translation;
 mod tree;
 
+pub use operator::PanelOperator;
 pub use points::{Points, PointsError};

@@ -105,6 +105,9 @@ pub(super) struct Grade {
     pub single: bool,
 }
 
+/// Below this cut all harmonics are kept.
+const LEAST_CUT: f64 = 1e-8;
+
 type Cache = Mutex<BTreeMap<(usize, u64, bool), Arc<Translations>>>;
 static CACHE: LazyLock<Cache> = LazyLock::new(Cache::default);
 
@@ -126,7 +129,11 @@ impl Translations {
         let n = parts(degree);
         let norm = norms(degree);
         let classes: Vec<usize> = classes(degree);
-        let (root, inverse_root) = gram_roots(degree, &norm, &classes);
+        // The eigenvectors come from squares, and squares end at 1e-16.
+        let whole = grade.cut < LEAST_CUT;
+        let identity = || Mat::<f64>::identity(n, n);
+        let (root, inverse_root) =
+            if whole { (identity(), identity()) } else { gram_roots(degree, &norm, &classes) };
         let directions: Vec<[i8; 3]> =
             (0..DIRECTIONS as i8).map(|k| [k / 16, k / 4 % 4, k % 4]).collect();
         // Halves of directions that exist with several signs.
@@ -142,17 +149,17 @@ impl Translations {
                         kernel[(a, b)] /= norm[a] * norm[b];
                     }
                 }
-                multiply(&multiply(&root, &kernel), &root)
+                if whole { kernel } else { multiply(&multiply(&root, &kernel), &root) }
             })
             .collect();
         let mut total = Mat::<f64>::zeros(n, n);
         for (d, kernel) in directions.iter().zip(&kernels) {
-            if kernel.nrows() > 0 {
+            if kernel.nrows() > 0 && !whole {
                 let mirrored = f64::from(1 << d.iter().filter(|c| **c > 0).count());
                 matmul(&mut total, Accum::Add, kernel, kernel.transpose(), mirrored, Par::Seq);
             }
         }
-        let (basis, class) = leading(&total, &classes, grade.cut);
+        let (basis, class) = if whole { (identity(), classes) } else { leading(&total, &classes, grade.cut) };
         let rank = basis.ncols();
         let mut reduction = multiply(basis.transpose(), &inverse_root);
         for a in 0..n {
@@ -161,7 +168,7 @@ impl Translations {
             }
         }
         let reduced = |kernel: &Mat<f64>| {
-            if kernel.nrows() == 0 { Mat::zeros(0, 0) } else { multiply(&multiply(basis.transpose(), kernel), &basis) }
+            if kernel.nrows() == 0 || whole { kernel.clone() } else { multiply(&multiply(basis.transpose(), kernel), &basis) }
         };
         let across = if grade.single {
             let single = |m: Mat<f64>| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] as f32);
