@@ -2,10 +2,13 @@
 
 mod close;
 mod clusters;
+mod krylov;
 mod near;
 mod operator;
 mod points;
+mod precondition;
 mod solid;
+mod solve;
 #[cfg(test)]
 mod tests;
 mod translation;
@@ -13,3 +16,4 @@ mod tree;
 
 pub use operator::PanelOperator;
 pub use points::{Points, PointsError};
+pub use solve::{IterativeError, IterativeReport, bytes_needed, solve_panels};

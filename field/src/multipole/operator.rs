@@ -20,6 +20,8 @@ pub struct PanelOperator<'a> {
     panels: &'a [Panel],
     pub(super) clusters: Clusters,
     points: Points,
+    /// The points of all panels, in the order of the clusters.
+    at: Vec<Vec3>,
     /// Weights of the rule.
     weights: Vec<f64>,
     pub(super) near: Near,
@@ -106,7 +108,7 @@ impl<'a> PanelOperator<'a> {
         let sum = Points::new(&points, &points, scheme.accuracy)?;
         let arch = Arch::new();
         let near = Near::new(panels, &clusters, &points, &rule.weights, &scheme, arch);
-        Ok(Self { panels, clusters, points: sum, weights: rule.weights.clone(), near, arch })
+        Ok(Self { panels, clusters, points: sum, at: points, weights: rule.weights.clone(), near, arch })
     }
 
     /// Bytes that stay allocated.
@@ -116,7 +118,7 @@ impl<'a> PanelOperator<'a> {
             Values::Double(v) => 8 * v.len(),
         };
         let near = values + 4 * self.near.columns.len() + 8 * self.near.starts.len();
-        self.points.bytes() + near as u64 + 4 * self.panels.len() as u64
+        self.points.bytes() + (near + 24 * self.at.len()) as u64 + 4 * self.panels.len() as u64
     }
 
     /// Pairs of panels whose entries are stored.
@@ -160,8 +162,9 @@ impl<'a> PanelOperator<'a> {
         })
     }
 
-    pub(super) fn arch(&self) -> Arch {
-        self.arch
+    /// The points that stand for the panels, panel by panel in the order of the clusters, and their weights.
+    pub(super) fn rule_points(&self) -> (&[Vec3], &[f64]) {
+        (&self.at, &self.weights)
     }
 
     pub(super) fn panels(&self) -> &'a [Panel] {

@@ -177,3 +177,31 @@ fn operator_is_the_dense_matrix() {
         }
     }
 }
+
+#[test]
+fn solutions_are_as_good_as_asked() {
+    use super::solve::solve_panels;
+    for (name, mesh) in meshes(2500) {
+        let panels = panels_of(&mesh);
+        let basis = crate::BoundaryProblem::new(&mesh).solve().unwrap();
+        let n = panels.len();
+        let right = Mat::from_fn(n, mesh.electrodes.len(), |i, c| f64::from(u8::from(mesh.electrode[i] as usize == c)));
+        for tolerance in [1e-3, 1e-4, 1e-6] {
+            let (charges, report) = solve_panels(&panels, right.as_ref(), tolerance, &mut |_, _| ()).unwrap();
+            let mut worst = 0.0_f64;
+            for c in 0..right.ncols() {
+                let (mut error, mut size) = (0.0, 0.0);
+                for i in 0..n {
+                    let exact = basis.charge[(i, c)] * crate::constants::COULOMB;
+                    error += (charges[(i, c)] - exact).powi(2);
+                    size += exact * exact;
+                }
+                worst = worst.max((error / size).sqrt());
+            }
+            println!(
+                "{name} {tolerance:.0e}: {worst:.1e} after {} iterations, {:.2} {:.2} {:.2} s",
+                report.iterations, report.operator_seconds, report.inverse_seconds, report.solve_seconds
+            );
+        }
+    }
+}
