@@ -5,7 +5,9 @@
 use std::time::Instant;
 
 use faer::Mat;
-use field::multipole::Points;
+use field::Panel;
+use field::multipole::{PanelOperator, Points, bytes_needed, solve_panels};
+use meshes::{Placement, Shape, SurfaceMesh, triangulate_to};
 use meshes::Vec3;
 
 /// Processor time of this process so far, s: user and system, in hundredths (proc(5), fields 14 and 15).
@@ -101,6 +103,55 @@ fn points(largest: usize) {
     }
 }
 
+/// A ring trap: two end caps and a ring between them.
+fn trap(panels: usize) -> SurfaceMesh {
+    let part = |name: &str, shape: Shape, z: f64| {
+        let placement = Placement { center: Vec3::z() * z, ..Placement::default() };
+        let mesh = triangulate_to(&shape, panels / 3).expect("a sound shape").0;
+        (name.to_owned(), mesh.placed(&placement).expect("it has a direction"))
+    };
+    let cap = || Shape::Sphere { radius: 0.4 };
+    let ring = Shape::Ring { radius: 1.0, wire_radius: 0.1 };
+    SurfaceMesh::assemble([part("below", cap(), -1.0), part("ring", ring, 0.0), part("above", cap(), 1.0)])
+}
+
+fn solve(largest: usize) {
+    for n in [10_000, 100_000, 1_000_000] {
+        for tolerance in [1e-3, 1e-4, 1e-6] {
+            if n > largest || (n > 100_000 && tolerance != 1e-4) {
+                continue;
+            }
+            let mesh = trap(n);
+            let panels: Vec<Panel> = (0..mesh.panels()).map(|p| Panel::new(mesh.corners(p))).collect();
+            let right =
+                Mat::from_fn(panels.len(), mesh.electrodes.len(), |i, c| f64::from(u8::from(mesh.electrode[i] as usize == c)));
+            let clock = Clock::start();
+            let solved = solve_panels(&panels, right.as_ref(), tolerance, &mut |_, _| ());
+            let time = clock.stop();
+            match solved {
+                Ok((_, report)) => {
+                    let what = format!("solve, {} iterations", report.iterations);
+                    row(&what, panels.len(), tolerance, report.residual, time, report.bytes);
+                    println!(
+                        "   operator {:.2} s, inverse {:.2} s, iterations {:.2} s; {:.0} MiB foreseen",
+                        report.operator_seconds,
+                        report.inverse_seconds,
+                        report.solve_seconds,
+                        bytes_needed(panels.len(), right.ncols(), tolerance) as f64 / 1024.0 / 1024.0
+                    );
+                }
+                Err(error) => println!("{error}"),
+            }
+            let clock = Clock::start();
+            let operator = PanelOperator::new(&panels, tolerance).expect("sound panels");
+            row("   operator", panels.len(), tolerance, f64::NAN, clock.stop(), operator.bytes());
+            let clock = Clock::start();
+            let _ = operator.apply_columns(right.as_ref());
+            row("   applied to three columns", panels.len(), tolerance, f64::NAN, clock.stop(), operator.bytes_applied(3));
+        }
+    }
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     let what = arguments.iter().find(|a| a.parse::<usize>().is_err()).map_or("", String::as_str);
@@ -111,5 +162,8 @@ fn main() {
     );
     if what.is_empty() || what == "points" {
         points(largest);
+    }
+    if what.is_empty() || what == "solve" {
+        solve(largest);
     }
 }

@@ -205,3 +205,33 @@ fn solutions_are_as_good_as_asked() {
         }
     }
 }
+
+#[test]
+#[ignore]
+fn schemes() {
+    use super::operator::{PanelOperator, Scheme};
+    use crate::linear_operator::GalerkinOperator;
+    for (name, mesh) in meshes(3000) {
+        let panels = panels_of(&mesh);
+        let n = panels.len();
+        let mut r = random(3);
+        let x = Mat::from_fn(n, 1, |i, _| panels[i].area * (r() - 0.5));
+        let xs: Vec<f64> = x.col(0).iter().copied().collect();
+        let judge = GalerkinOperator { panels: &panels };
+        let rows: Vec<usize> = (0..n).step_by(7).collect();
+        let exact: Vec<f64> = rows.iter().map(|&i| judge.row(i, &xs)).collect();
+        let best = PanelOperator::with_scheme(&panels, Scheme { degree: 8, near: 3.0, accuracy: 1e-8, single: false }).unwrap().apply_columns(x.as_ref());
+        for degree in [1, 2, 3, 4, 5, 6] {
+            for near in [1.5, 2.0, 3.0] {
+                let y = PanelOperator::with_scheme(&panels, Scheme { degree, near, accuracy: 1e-7, single: false }).unwrap().apply_columns(x.as_ref());
+                let (mut e1, mut e2, mut size) = (0.0, 0.0, 0.0);
+                for (&i, e) in rows.iter().zip(&exact) {
+                    e1 += (y[(i, 0)] - e).powi(2);
+                    e2 += (y[(i, 0)] - best[(i, 0)]).powi(2);
+                    size += e * e;
+                }
+                println!("{name} degree {degree} near {near}: dense {:.1e} best {:.1e}", (e1 / size).sqrt(), (e2 / size).sqrt());
+            }
+        }
+    }
+}
