@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use faer::Mat;
 use field::Panel;
-use field::multipole::{PanelOperator, Points, bytes_needed, solve_panels};
+use field::multipole::{FIELD_ACCURACY, PanelOperator, PanelsAtPoints, Points, bytes_needed, solve_panels};
 use meshes::{Placement, Shape, SurfaceMesh, triangulate_to};
 use meshes::Vec3;
 
@@ -152,6 +152,39 @@ fn solve(largest: usize) {
     }
 }
 
+fn evaluate(largest: usize) {
+    for (n, side) in [(10_000, 58), (100_000, 126), (1_000_000, 126)] {
+        if n > largest {
+            continue;
+        }
+        let mesh = trap(n);
+        let panels: Vec<Panel> = (0..mesh.panels()).map(|p| Panel::new(mesh.corners(p))).collect();
+        let charges = Mat::from_fn(panels.len(), 1, |i, _| panels[i].area * (1.0 + panels[i].centroid.x));
+        let at = |i: usize| 3.0 * (i as f64 / (side - 1) as f64) - 1.5;
+        let grid: Vec<Vec3> =
+            (0..side * side * side).map(|i| Vec3::new(at(i % side), at(i / side % side), at(i / side / side))).collect();
+        let clock = Clock::start();
+        let sums = PanelsAtPoints::new(&panels, &grid, FIELD_ACCURACY).expect("sound panels");
+        row(&format!("field of {} panels: build", panels.len()), grid.len(), FIELD_ACCURACY, f64::NAN, clock.stop(), sums.bytes());
+        let clock = Clock::start();
+        let found = sums.potentials_and_gradients(charges.as_ref());
+        let time = clock.stop();
+        let (mut error, mut size) = (0.0, 0.0);
+        for t in (0..grid.len()).step_by(grid.len() / 40) {
+            let add = |(v, g): (f64, Vec3), p: usize| {
+                let (value, slope) = panels[p].potential_and_gradient(&grid[t]);
+                let density = charges[(p, 0)] / panels[p].area;
+                (v + density * value, g + slope * density)
+            };
+            let (_, g) = (0..panels.len()).fold((0.0, Vec3::zeros()), add);
+            error += (g - Vec3::new(found[(t, 1)], found[(t, 2)], found[(t, 3)])).norm_squared();
+            size += g.norm_squared();
+        }
+        let measured = f64::sqrt(error / size);
+        row("   potential and gradient", grid.len(), FIELD_ACCURACY, measured, time, sums.bytes_applied(1));
+    }
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     let what = arguments.iter().find(|a| a.parse::<usize>().is_err()).map_or("", String::as_str);
@@ -162,6 +195,9 @@ fn main() {
     );
     if what.is_empty() || what == "points" {
         points(largest);
+    }
+    if what.is_empty() || what == "evaluate" {
+        evaluate(largest);
     }
     if what.is_empty() || what == "solve" {
         solve(largest);

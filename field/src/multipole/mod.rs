@@ -2,6 +2,7 @@
 
 mod close;
 mod clusters;
+mod evaluate;
 mod krylov;
 mod near;
 mod operator;
@@ -14,6 +15,7 @@ mod tests;
 mod translation;
 mod tree;
 
+pub use evaluate::{FIELD_ACCURACY, PanelsAtPoints};
 pub use operator::PanelOperator;
 pub use points::{Points, PointsError};
 pub use solve::{IterativeError, IterativeReport, bytes_needed, solve_panels};

@@ -89,9 +89,20 @@ fn grade(accuracy: f64) -> (Grade, Shape) {
     let degree = if digits < 6.0 { 2.6 * digits - 2.0 } else { 13.6 + 5.0 * (digits - 6.0) };
     let degree = (degree.ceil() as usize).max(1);
     let grade = Grade { degree, cut: CUT * accuracy, single: accuracy >= SINGLE_TO };
-    // Between 40 and 120 points the time changes by a tenth; larger leaves save memory.
-    let shape = Shape { leaf: 60, pairs: 100, single: parts(degree) };
-    (grade, shape)
+    (grade, shape(grade))
+}
+
+/// Points of a leaf for each number of the reduced basis: translations, whose work goes with the square of the rank, take as
+/// long then as near pairs. In double precision they take twice as long.
+const LEAF_SINGLE: f64 = 1.1;
+const LEAF_DOUBLE: f64 = 1.6;
+
+/// The tree's shape for a grade.
+fn shape(grade: Grade) -> Shape {
+    let rank = Translations::of(grade).rank;
+    let leaf = if grade.single { LEAF_SINGLE } else { LEAF_DOUBLE } * rank as f64;
+    // A translation is worth rank²/100 pairs or so, a value of an expansion as many points as it has numbers.
+    Shape { leaf: (leaf as usize).max(30), pairs: (rank * rank / 40).max(30), single: parts(grade.degree) }
 }
 
 /// Share of the accuracy that the reduced basis may take: 0.2 leaves errors just above what was asked.
@@ -273,9 +284,17 @@ impl Points {
     }
 
     fn values<T: Number>(&self, charges: &[&[f64]], gradients: bool) -> Vec<f64> {
+        let t0 = std::time::Instant::now();
         let moments = self.moments(charges);
+        let t1 = std::time::Instant::now();
         let locals = self.locals::<T>(charges, &moments);
-        self.evaluate(charges, &moments, &locals, gradients)
+        let t2 = std::time::Instant::now();
+        let r = self.evaluate(charges, &moments, &locals, gradients);
+        if std::env::var("MP_PHASES").is_ok() {
+            let pairs: usize = self.batches.iter().map(|b| b.pairs.len()).sum();
+            eprintln!("PHASE nodes {} pairs {} rank {} degree {}: moments {:.3} locals {:.3} evaluate {:.3}", self.tree.nodes.len(), pairs, self.translations.rank, self.translations.degree, (t1-t0).as_secs_f64(), (t2-t1).as_secs_f64(), t2.elapsed().as_secs_f64());
+        }
+        r
     }
 
     /// Multipoles of all nodes, `parts` numbers for each column of each node.

@@ -220,10 +220,10 @@ fn schemes() {
         let judge = GalerkinOperator { panels: &panels };
         let rows: Vec<usize> = (0..n).step_by(7).collect();
         let exact: Vec<f64> = rows.iter().map(|&i| judge.row(i, &xs)).collect();
-        let best = PanelOperator::with_scheme(&panels, Scheme { degree: 8, near: 3.0, accuracy: 1e-8, single: false }).unwrap().apply_columns(x.as_ref());
+        let best = PanelOperator::with_scheme(&panels, Scheme { degree: 8, near: 3.0, rules_from: 3.0, accuracy: 1e-8, single: false }).unwrap().apply_columns(x.as_ref());
         for degree in [1, 2, 3, 4, 5, 6] {
             for near in [1.5, 2.0, 3.0] {
-                let y = PanelOperator::with_scheme(&panels, Scheme { degree, near, accuracy: 1e-7, single: false }).unwrap().apply_columns(x.as_ref());
+                let y = PanelOperator::with_scheme(&panels, Scheme { degree, near, rules_from: 3.0, accuracy: 1e-7, single: false }).unwrap().apply_columns(x.as_ref());
                 let (mut e1, mut e2, mut size) = (0.0, 0.0, 0.0);
                 for (&i, e) in rows.iter().zip(&exact) {
                     e1 += (y[(i, 0)] - e).powi(2);
@@ -231,6 +231,47 @@ fn schemes() {
                     size += e * e;
                 }
                 println!("{name} degree {degree} near {near}: dense {:.1e} best {:.1e}", (e1 / size).sqrt(), (e2 / size).sqrt());
+            }
+        }
+    }
+}
+
+#[test]
+fn fields_are_those_of_the_panel_sum() {
+    use super::evaluate::PanelsAtPoints;
+    use crate::{BasisField, Samples};
+    for (name, mesh) in meshes(1500) {
+        let basis = crate::BoundaryProblem::new(&mesh).solve().unwrap();
+        let mut r = random(11);
+        // Far and near, and some on the panels' corners.
+        let mut points: Vec<Vec3> = (0..1500).map(|_| Vec3::new(3.0 * r() - 1.5, 3.0 * r() - 1.5, 3.0 * r() - 1.5)).collect();
+        points.extend(basis.panels.iter().step_by(3).map(|p| p.centroid + p.normal * (p.radius * 3.0 * r())));
+        let weights = (0..mesh.electrodes.len())
+            .map(|e| (0..mesh.electrodes.len()).map(|k| f64::from(u8::from(e == k))).collect())
+            .collect();
+        let judge = crate::PanelSum::new(&basis, weights);
+        let points: Vec<Vec3> = points.into_iter().filter(|p| judge.inside(p).is_none()).collect();
+        let mut samples = Samples::default();
+        judge.sample(&points, &mut samples);
+        let charges = Mat::from_fn(basis.panels.len(), mesh.electrodes.len(), |i, c| basis.charge[(i, c)] * crate::constants::COULOMB);
+        let k = charges.ncols();
+        for accuracy in [1e-3, 1e-5, 1e-7] {
+            let sums = PanelsAtPoints::new(&basis.panels, &points, accuracy).unwrap();
+            let found = sums.potentials_and_gradients(charges.as_ref());
+            for c in 0..k {
+                let (mut error, mut size) = ([0.0; 2], [0.0; 2]);
+                for t in 0..points.len() {
+                    let exact = samples.gradient[t * k + c];
+                    let exact = [samples.potential[t * k + c], exact.x, exact.y, exact.z];
+                    for o in 0..4 {
+                        error[usize::from(o > 0)] += (found[(t, 4 * c + o)] - exact[o]).powi(2);
+                        size[usize::from(o > 0)] += exact[o].powi(2);
+                    }
+                }
+                let [potential, gradient] = [0, 1].map(|kind| (error[kind] / size[kind]).sqrt());
+                println!("{name} {accuracy:.0e}: potential {potential:.1e}, gradient {gradient:.1e}");
+                // The judge expands panels from 28 radii on, which leaves 1e-8.
+                assert!(potential < accuracy && gradient < accuracy, "{name} at {accuracy:e}");
             }
         }
     }
