@@ -7,8 +7,8 @@ use std::time::Instant;
 use faer::Mat;
 use field::Panel;
 use field::multipole::{FIELD_ACCURACY, PanelOperator, PanelsAtPoints, Points, bytes_needed, solve_panels};
-use meshes::{Placement, Shape, SurfaceMesh, triangulate_to};
 use meshes::Vec3;
+use meshes::{Placement, Shape, SurfaceMesh, triangulate_to};
 
 /// Processor time of this process so far, s: user and system, in hundredths (proc(5), fields 14 and 15).
 fn core_seconds() -> f64 {
@@ -123,8 +123,9 @@ fn solve(largest: usize) {
             }
             let mesh = trap(n);
             let panels: Vec<Panel> = (0..mesh.panels()).map(|p| Panel::new(mesh.corners(p))).collect();
-            let right =
-                Mat::from_fn(panels.len(), mesh.electrodes.len(), |i, c| f64::from(u8::from(mesh.electrode[i] as usize == c)));
+            let right = Mat::from_fn(panels.len(), mesh.electrodes.len(), |i, c| {
+                f64::from(u8::from(mesh.electrode[i] as usize == c))
+            });
             let clock = Clock::start();
             let solved = solve_panels(&panels, right.as_ref(), tolerance, &mut |_, _| ());
             let time = clock.stop();
@@ -147,7 +148,14 @@ fn solve(largest: usize) {
             row("   operator", panels.len(), tolerance, f64::NAN, clock.stop(), operator.bytes());
             let clock = Clock::start();
             let _ = operator.apply_columns(right.as_ref());
-            row("   applied to three columns", panels.len(), tolerance, f64::NAN, clock.stop(), operator.bytes_applied(3));
+            row(
+                "   applied to three columns",
+                panels.len(),
+                tolerance,
+                f64::NAN,
+                clock.stop(),
+                operator.bytes_applied(3),
+            );
         }
     }
 }
@@ -161,11 +169,19 @@ fn evaluate(largest: usize) {
         let panels: Vec<Panel> = (0..mesh.panels()).map(|p| Panel::new(mesh.corners(p))).collect();
         let charges = Mat::from_fn(panels.len(), 1, |i, _| panels[i].area * (1.0 + panels[i].centroid.x));
         let at = |i: usize| 3.0 * (i as f64 / (side - 1) as f64) - 1.5;
-        let grid: Vec<Vec3> =
-            (0..side * side * side).map(|i| Vec3::new(at(i % side), at(i / side % side), at(i / side / side))).collect();
+        let grid: Vec<Vec3> = (0..side * side * side)
+            .map(|i| Vec3::new(at(i % side), at(i / side % side), at(i / side / side)))
+            .collect();
         let clock = Clock::start();
         let sums = PanelsAtPoints::new(&panels, &grid, FIELD_ACCURACY).expect("sound panels");
-        row(&format!("field of {} panels: build", panels.len()), grid.len(), FIELD_ACCURACY, f64::NAN, clock.stop(), sums.bytes());
+        row(
+            &format!("field of {} panels: build", panels.len()),
+            grid.len(),
+            FIELD_ACCURACY,
+            f64::NAN,
+            clock.stop(),
+            sums.bytes(),
+        );
         let clock = Clock::start();
         let found = sums.potentials_and_gradients(charges.as_ref());
         let time = clock.stop();

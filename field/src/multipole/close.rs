@@ -80,7 +80,10 @@ impl WithSimd for Distances<'_> {
         for v in 0..xs.len() {
             let (dx, dy, dz) = (simd.sub_f64s(x, xs[v]), simd.sub_f64s(y, ys[v]), simd.sub_f64s(z, zs[v]));
             let r2 = simd.mul_add_e_f64s(dx, dx, simd.mul_add_e_f64s(dy, dy, simd.mul_f64s(dz, dz)));
-            sum = simd.add_f64s(sum, simd.div_f64s(ws[v], simd.sqrt_f64s(r2)));
+            // A point on itself does not act.
+            let over = simd.div_f64s(ws[v], simd.sqrt_f64s(r2));
+            let zero = simd.splat_f64s(0.0);
+            sum = simd.add_f64s(sum, simd.select_f64s(simd.greater_than_f64s(r2, zero), over, zero));
         }
         simd.reduce_sum_f64s(sum)
     }
@@ -115,11 +118,8 @@ impl<const HALVINGS: usize> WithSimd for Sum<'_, HALVINGS> {
         for v in 0..xs.len() {
             let x = [xs[v], ys[v], zs[v]];
             let r = [minus(corners[0], x), minus(corners[1], x), minus(corners[2], x)];
-            let length = [
-                simd.sqrt_f64s(dot(r[0], r[0])),
-                simd.sqrt_f64s(dot(r[1], r[1])),
-                simd.sqrt_f64s(dot(r[2], r[2])),
-            ];
+            let length =
+                [simd.sqrt_f64s(dot(r[0], r[0])), simd.sqrt_f64s(dot(r[1], r[1])), simd.sqrt_f64s(dot(r[2], r[2]))];
             let mut value = zero;
             for i in 0..3 {
                 let j = (i + 1) % 3;
@@ -143,9 +143,8 @@ impl<const HALVINGS: usize> WithSimd for Sum<'_, HALVINGS> {
             let across = dot([dot(r[0], r[1]), dot(r[1], r[2]), dot(r[2], r[0])], [c, a, b]);
             let denominator = simd.add_f64s(product, across);
             let numerator = simd.mul_f64s(number(2.0 * panel.area), height);
-            let size = simd.sqrt_f64s(
-                simd.mul_add_e_f64s(numerator, numerator, simd.mul_f64s(denominator, denominator)),
-            );
+            let size =
+                simd.sqrt_f64s(simd.mul_add_e_f64s(numerator, numerator, simd.mul_f64s(denominator, denominator)));
             let below = simd.max_f64s(simd.add_f64s(size, denominator), number(f64::MIN_POSITIVE));
             let mut t = simd.div_f64s(numerator, below);
             // One radius away, a quarter of the solid angle is below 0.4 already.

@@ -41,9 +41,10 @@ impl Clusters {
     fn divide(&mut self, panels: &[Panel], order: &mut [u32], first: usize, size: usize) {
         let panel = |p: &u32| &panels[*p as usize];
         let start = panel(&order[0]).centroid;
-        let (low, high, radius) = order.iter().map(panel).fold((start, start, 0.0_f64), |(l, h, r), p| {
-            (l.inf(&p.centroid), h.sup(&p.centroid), r.max(p.radius))
-        });
+        let (low, high, radius) = order
+            .iter()
+            .map(panel)
+            .fold((start, start, 0.0_f64), |(l, h, r), p| (l.inf(&p.centroid), h.sup(&p.centroid), r.max(p.radius)));
         let at = self.nodes.len();
         self.nodes.push(Node { low, high, radius, panels: first..first + order.len(), second: 0 });
         if order.len() > size {

@@ -163,11 +163,8 @@ impl Task<'_> {
                     let q: [S::f64s; C] = std::array::from_fn(|c| simd.splat_f64s(charges[c][j]));
                     for v in 0..V {
                         let d = [simd.sub_f64s(x[v], at[0]), simd.sub_f64s(y[v], at[1]), simd.sub_f64s(z[v], at[2])];
-                        let r2 = simd.mul_add_e_f64s(
-                            d[0],
-                            d[0],
-                            simd.mul_add_e_f64s(d[1], d[1], simd.mul_f64s(d[2], d[2])),
-                        );
+                        let r2 =
+                            simd.mul_add_e_f64s(d[0], d[0], simd.mul_add_e_f64s(d[1], d[1], simd.mul_f64s(d[2], d[2])));
                         let acts = simd.greater_than_f64s(r2, least);
                         let inverse = simd.select_f64s(acts, simd.inverse_root(r2), zero);
                         if O == C {

@@ -113,7 +113,8 @@ const SINGLE_TO: f64 = 5e-6;
 
 impl Points {
     /// Prepares the sum over `sources` (m) at `targets` (m) to a relative accuracy: root mean square of the errors over that
-    /// of the potentials, likewise of the gradients.
+    /// of the potentials, likewise of the gradients. Where sources cancel each other, as inside a closed shell, errors are
+    /// relative to what they would give without.
     ///
     /// # Errors
     /// See [`PointsError`].
@@ -143,13 +144,7 @@ impl Points {
         Ok(Self::with_grade(sources, targets, reach, grade, shape))
     }
 
-    pub(super) fn with_grade(
-        sources: &[Vec3],
-        targets: &[Vec3],
-        reach: &[f64],
-        grade: Grade,
-        shape: Shape,
-    ) -> Self {
+    pub(super) fn with_grade(sources: &[Vec3], targets: &[Vec3], reach: &[f64], grade: Grade, shape: Shape) -> Self {
         let translations = Translations::of(grade);
         let tree = Octree::new(sources, targets, reach, &shape);
         let mut lists = tree.lists(&shape);
@@ -166,9 +161,7 @@ impl Points {
             .map(|nodes| {
                 let mut pairs: Vec<Pair> = nodes
                     .clone()
-                    .flat_map(|n| {
-                        lists[n].translated.iter().map(move |&(source, d)| (n, source, d))
-                    })
+                    .flat_map(|n| lists[n].translated.iter().map(move |&(source, d)| (n, source, d)))
                     .map(|(n, source, d)| Pair {
                         direction: direction_number(d) as u8,
                         sign: sign_number(d) as u8,
@@ -265,11 +258,8 @@ impl Points {
             .map(|c| self.tree.source_order.iter().map(|&i| charges[(i as usize, c)]).collect())
             .collect();
         let sorted: Vec<&[f64]> = sorted.iter().map(Vec::as_slice).collect();
-        let values = if self.single {
-            self.values::<f32>(&sorted, gradients)
-        } else {
-            self.values::<f64>(&sorted, gradients)
-        };
+        let values =
+            if self.single { self.values::<f32>(&sorted, gradients) } else { self.values::<f64>(&sorted, gradients) };
         // Leaf by leaf, output by output.
         for leaf in self.tree.nodes.iter().filter(|n| n.is_leaf() && !n.targets.is_empty()) {
             let range = leaf.target_range();
@@ -284,17 +274,9 @@ impl Points {
     }
 
     fn values<T: Number>(&self, charges: &[&[f64]], gradients: bool) -> Vec<f64> {
-        let t0 = std::time::Instant::now();
         let moments = self.moments(charges);
-        let t1 = std::time::Instant::now();
         let locals = self.locals::<T>(charges, &moments);
-        let t2 = std::time::Instant::now();
-        let r = self.evaluate(charges, &moments, &locals, gradients);
-        if std::env::var("MP_PHASES").is_ok() {
-            let pairs: usize = self.batches.iter().map(|b| b.pairs.len()).sum();
-            eprintln!("PHASE nodes {} pairs {} rank {} degree {}: moments {:.3} locals {:.3} evaluate {:.3}", self.tree.nodes.len(), pairs, self.translations.rank, self.translations.degree, (t1-t0).as_secs_f64(), (t2-t1).as_secs_f64(), t2.elapsed().as_secs_f64());
-        }
-        r
+        self.evaluate(charges, &moments, &locals, gradients)
     }
 
     /// Multipoles of all nodes, `parts` numbers for each column of each node.
@@ -307,12 +289,7 @@ impl Points {
             |relative, (moments, node)| {
                 if node.is_leaf() && !node.sources.is_empty() {
                     let range = node.source_range();
-                    relative.set(
-                        self.sources.lists(),
-                        range.clone(),
-                        &self.tree.center(node),
-                        self.tree.half(node),
-                    );
+                    relative.set(self.sources.lists(), range.clone(), &self.tree.center(node), self.tree.half(node));
                     let charges: Vec<&[f64]> = charges.iter().map(|q| &q[range.clone()]).collect();
                     gather(self.arch, Family::Regular, degree, relative, &charges, moments);
                 }

@@ -8,7 +8,6 @@
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::Solve;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
-use meshes::Vec3;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -96,37 +95,31 @@ fn block(operator: &PanelOperator, cluster: Range<usize>, places: &mut [u32]) ->
     for (k, &p) in patch.iter().enumerate() {
         places[p as usize] = k as u32;
     }
-    let center = cluster.clone().map(|p| at(p).centroid).sum::<Vec3>() / cluster.len() as f64;
     let mut around: Vec<(f64, u32)> = Vec::new();
     for i in cluster.clone() {
         for &j in &near.columns[near.starts[i]..near.starts[i + 1]] {
             if places[j as usize] == u32::MAX {
                 places[j as usize] = 0;
                 let nearest = cluster.clone().map(|i| (at(i).centroid - at(j as usize).centroid).norm_squared());
-                let _ = center;
                 around.push((nearest.fold(f64::INFINITY, f64::min), j));
             }
         }
     }
     around.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    for (k, (_, j)) in around.iter().enumerate() {
+    for (_, j) in &around {
         if patch.len() < LARGEST.max(cluster.len()) {
             places[*j as usize] = patch.len() as u32;
             patch.push(*j);
         } else {
-            let _ = k;
             places[*j as usize] = u32::MAX;
         }
     }
     let m = patch.len();
     let mut matrix = Mat::<f64>::zeros(m, m);
     for b in 0..m {
-        for a in b..m {
-            if a != b {
-                matrix[(a, b)] = by_points(operator, patch[a] as usize, patch[b] as usize);
-            } else {
-                matrix[(a, b)] = by_points(operator, patch[a] as usize, patch[a] as usize);
-            }
+        let one = at(patch[b] as usize);
+        for a in b + 1..m {
+            matrix[(a, b)] = by_moments(one, at(patch[a] as usize));
         }
     }
     for (a, &i) in patch.iter().enumerate() {
@@ -134,7 +127,7 @@ fn block(operator: &PanelOperator, cluster: Range<usize>, places: &mut [u32]) ->
         for k in range {
             let b = places[near.columns[k] as usize];
             if b != u32::MAX && b as usize <= a {
-                matrix[(a, b as usize)] += near.values.at(k);
+                matrix[(a, b as usize)] = f64::from(near.entries[k]);
             }
         }
     }
@@ -158,16 +151,12 @@ fn block(operator: &PanelOperator, cluster: Range<usize>, places: &mut [u32]) ->
     Block { cluster, patch, rows }
 }
 
-/// The entry of two panels by the points that stand for them.
-fn by_points(operator: &PanelOperator, i: usize, j: usize) -> f64 {
-    let (points, weights) = operator.rule_points();
-    let q = weights.len();
-    let mut sum = 0.0;
-    for (x, w) in points[i * q..(i + 1) * q].iter().zip(weights) {
-        for (y, v) in points[j * q..(j + 1) * q].iter().zip(weights) {
-            let r = (x - y).norm();
-            sum += if r > 0.0 { w * v / r } else { 0.0 };
-        }
-    }
-    sum
+/// The entry of two panels that are not near: 1/R + ½ (M₁ + M₂) : ∇∇(1/R), M the second moments.
+fn by_moments(one: &Panel, other: &Panel) -> f64 {
+    let arm = one.centroid - other.centroid;
+    let r2 = arm.norm_squared();
+    let m: [f64; 6] = std::array::from_fn(|k| one.moments[k] + other.moments[k]);
+    let [x, y, z] = [arm.x, arm.y, arm.z];
+    let quadratic = m[0] * x * x + m[1] * y * y + m[2] * z * z + 2.0 * (m[3] * x * y + m[4] * x * z + m[5] * y * z);
+    (1.0 + 0.5 * (3.0 * quadratic / r2 - (m[0] + m[1] + m[2])) / r2) / r2.sqrt()
 }

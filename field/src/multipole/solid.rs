@@ -105,7 +105,14 @@ fn fill<S: Simd>(simd: S, family: Family, degree: usize, [x, y, z]: [S::f64s; 3]
 }
 
 /// Adds Σ q X of the points to `sums`, `parts(degree)` numbers for each column of charges.
-pub(super) fn gather(arch: Arch, family: Family, degree: usize, points: &Relative, charges: &[&[f64]], sums: &mut [f64]) {
+pub(super) fn gather(
+    arch: Arch,
+    family: Family,
+    degree: usize,
+    points: &Relative,
+    charges: &[&[f64]],
+    sums: &mut [f64],
+) {
     if points.count > 0 {
         arch.dispatch(Gather { family, degree, points, charges, sums });
     }
@@ -309,7 +316,8 @@ mod tests {
             for axis in 0..3 {
                 let mut d = Vec3::zeros();
                 d[axis] = step;
-                let slope = (form_at(family, degree, &form, &(x + d)) - form_at(family, degree, &form, &(x - d))) / (2.0 * step);
+                let slope = (form_at(family, degree, &form, &(x + d)) - form_at(family, degree, &form, &(x - d)))
+                    / (2.0 * step);
                 let exact = form_at(family, other, &forms[axis], &x);
                 // Differences are good to the square of the step.
                 assert!((slope / exact - 1.0).abs() < 1e-6, "{family:?} {axis}: {slope} {exact}");

@@ -5,7 +5,7 @@ use std::time::Instant;
 use faer::{Mat, MatRef};
 
 use super::krylov;
-use super::operator::PanelOperator;
+use super::operator::{PanelOperator, Scheme};
 use super::points::PointsError;
 use super::precondition::Patches;
 use crate::panel::Panel;
@@ -79,7 +79,7 @@ const RESIDUAL: f64 = 0.1;
 
 /// Accuracy of the operator over the tolerance, asked of charges of random sign; for those of a solution it is some ten times
 /// better.
-const OPERATOR: f64 = 0.5;
+const OPERATOR: f64 = 0.7;
 
 /// Bytes that [`solve_panels`] needs at its peak for so many panels and right-hand sides, from above for surfaces.
 pub fn bytes_needed(panels: usize, columns: usize, tolerance: f64) -> u64 {
@@ -122,9 +122,10 @@ pub fn solve_panels(
     if n == 0 || right_hand_sides.ncols() == 0 {
         return Ok((charges, report));
     }
-    let operator = PanelOperator::new(panels, OPERATOR * tolerance)?;
+    let mut operator = PanelOperator::with_scheme(panels, Scheme::of(OPERATOR * tolerance))?;
     report.operator_seconds = start.elapsed().as_secs_f64();
     let inverse = Patches::new(&operator);
+    operator.forget_entries();
     report.inverse_seconds = start.elapsed().as_secs_f64() - report.operator_seconds;
     let order = &operator.clusters.order;
     let wanted = RESIDUAL * tolerance;

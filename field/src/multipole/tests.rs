@@ -54,7 +54,13 @@ pub(super) fn direct(sources: &[Vec3], charges: &[f64], target: &Vec3) -> [f64; 
 }
 
 /// Errors of potentials and of gradients on every `stride`th target, root mean square over that of the exact ones.
-pub(super) fn errors(sources: &[Vec3], charges: &Mat<f64>, targets: &[Vec3], found: &Mat<f64>, stride: usize) -> [f64; 2] {
+pub(super) fn errors(
+    sources: &[Vec3],
+    charges: &Mat<f64>,
+    targets: &[Vec3],
+    found: &Mat<f64>,
+    stride: usize,
+) -> [f64; 2] {
     let mut worst = [0.0_f64; 2];
     for c in 0..charges.ncols() {
         let q: Vec<f64> = charges.col(c).iter().copied().collect();
@@ -84,47 +90,81 @@ pub(super) fn some_charges(n: usize) -> Mat<f64> {
     charges
 }
 
+fn check_points(n: usize, name: &str, points: &[Vec3], accuracy: f64) {
+    let charges = some_charges(n);
+    let sum = Points::new(points, points, accuracy).unwrap();
+    let found = sum.potentials_and_gradients(charges.as_ref());
+    let [potential, gradient] = errors(points, &charges, points, &found, n / 200);
+    println!("{name:15} {accuracy:.0e}: potential {potential:.1e}, gradient {gradient:.1e}");
+    // What was asked is what is promised; far below it nothing went through expansions.
+    assert!(potential < accuracy && gradient < accuracy, "{name} at {accuracy:e}");
+    assert!(potential > 1e-4 * accuracy, "{name} at {accuracy:e} was summed point by point");
+}
+
 #[test]
 fn points_are_as_good_as_asked() {
-    let n = 5000;
+    let n = 15_000;
     for (name, points) in clouds(n) {
-        let charges = some_charges(n);
-        for accuracy in [1e-2, 1e-4, 1e-6, 1e-8, 1e-10] {
-            // The translations of the finest take a second by themselves.
-            if accuracy < 1e-9 && name != "graded sheet" {
-                continue;
-            }
-            let sum = Points::new(&points, &points, accuracy).unwrap();
-            let found = sum.potentials_and_gradients(charges.as_ref());
-            let [potential, gradient] = errors(&points, &charges, &points, &found, 17);
-            println!("{name:15} {accuracy:.0e}: potential {potential:.1e}, gradient {gradient:.1e}");
-            // What was asked is what is promised.
-            assert!(potential < accuracy && gradient < accuracy, "{name} at {accuracy:e}");
+        for accuracy in [1e-2, 1e-4, 1e-6] {
+            check_points(n, name, &points, accuracy);
         }
+    }
+    let (name, points) = &clouds(n)[0];
+    check_points(n, name, points, 1e-8);
+}
+
+/// Some ten seconds and 1 GiB.
+#[test]
+#[ignore = "the translations of the finest accuracy take long"]
+fn the_finest_accuracy_is_reached() {
+    let n = 40_000;
+    for (name, points) in clouds(n).into_iter().skip(1).take(2) {
+        check_points(n, name, &points, 1e-10);
     }
 }
 
 #[test]
-#[ignore]
-fn calibrate() {
-    use super::{translation::Grade, tree::Shape};
-    let n = 30000;
-    for (name, points) in clouds(n).into_iter().take(2) {
-        let charges = some_charges(n);
-        for degree in [4, 6, 8, 10, 12, 14, 17, 20, 24] {
-            let best = 10_f64.powf(-(degree as f64 - 0.5) / 1.8);
-            for cut in [best, best / 3.0, best / 10.0] {
-                let grade = Grade { degree, cut, single: cut > 1e-6 };
-                let shape = Shape { leaf: 60, pairs: 100, single: super::solid::parts(degree) };
-                let sum = Points::with_grade(&points, &points, &[], grade, shape);
-                let clock = std::time::Instant::now();
-                let found = sum.potentials_and_gradients(charges.as_ref());
-                let time = clock.elapsed().as_secs_f64();
-                let [potential, gradient] = errors(&points, &charges, &points, &found, 97);
-                println!("{name:10} degree {degree} cut {cut:.1e} rank {}: {potential:.1e} {gradient:.1e} {time:.3}", super::translation::Translations::of(grade).rank);
-            }
-        }
-    }
+fn targets_need_not_be_sources() {
+    let mut r = random(5);
+    let sources: Vec<Vec3> = (0..5000).map(|_| direction(&mut r)).collect();
+    // Inside and outside, and near: deep inside an even shell there is no field that an error could be compared with.
+    let targets: Vec<Vec3> = (0..9000).map(|_| direction(&mut r) * (0.5 + r())).collect();
+    let charges = some_charges(sources.len());
+    let sum = Points::new(&sources, &targets, 1e-5).unwrap();
+    let found = sum.potentials_and_gradients(charges.as_ref());
+    let [potential, gradient] = errors(&sources, &charges, &targets, &found, 29);
+    assert!(potential < 1e-5 && gradient < 1e-5, "{potential:e} {gradient:e}");
+    // Without gradients the same, and column by column.
+    let alone = sum.potentials(charges.as_ref().get(.., 1..2));
+    let error = (0..targets.len()).map(|t| (alone[(t, 0)] - found[(t, 4)]).abs()).fold(0.0, f64::max);
+    assert!(error < 1e-9 * found.norm_max(), "{error:e}");
+}
+
+#[test]
+fn what_cannot_be_summed_is_refused() {
+    let (good, bad) = ([Vec3::zeros()], [Vec3::new(0.0, f64::NAN, 0.0)]);
+    assert!(Points::new(&good, &bad, 1e-4).is_err() && Points::new(&good, &good, 0.0).is_err());
+    let none = Points::new(&[], &good, 1e-4).unwrap().potentials(Mat::zeros(0, 2).as_ref());
+    assert_eq!((none.nrows(), none.norm_max()), (1, 0.0));
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let (_, mesh) = meshes(1500).swap_remove(1);
+    let panels = panels_of(&mesh);
+    let right = Mat::from_fn(panels.len(), 2, |i, c| f64::from(u8::from(mesh.electrode[i] as usize == c)));
+    let (_, cloud) = clouds(6000).swap_remove(2);
+    let charges = some_charges(cloud.len());
+    let on = |threads: usize| {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
+            let sums = Points::new(&cloud, &cloud, 1e-4).unwrap().potentials_and_gradients(charges.as_ref());
+            let solved = super::solve_panels(&panels, right.as_ref(), 1e-3, &mut |_, _| ()).unwrap().0;
+            let field = super::PanelsAtPoints::new(&panels, &cloud, 1e-3).unwrap();
+            (sums, field.potentials_and_gradients(solved.as_ref()), solved)
+        })
+    };
+    let one = on(1);
+    assert!(one == on(2) && one == on(3));
 }
 
 /// A sphere, and two electrodes with panels of very different size.
@@ -163,16 +203,17 @@ fn operator_is_the_dense_matrix() {
         let rows: Vec<usize> = (0..n).step_by(7).collect();
         for (kind, x) in [("even", x), ("random", noise)] {
             let exact: Vec<f64> = rows.iter().map(|&i| judge.row(i, &x)).collect();
-            for accuracy in [1e-3, 1e-4, 1e-5, 1e-6, 1e-7] {
-                let clock = std::time::Instant::now();
+            for accuracy in [1e-3, 1e-4, 1e-5, 1e-6] {
                 let operator = PanelOperator::new(&panels, accuracy).unwrap();
-                let built = clock.elapsed().as_secs_f64();
                 let mut y = vec![0.0; n];
                 operator.apply(&x, &mut y);
                 let error: f64 = rows.iter().zip(&exact).map(|(&i, e)| (y[i] - e).powi(2)).sum();
                 let size: f64 = exact.iter().map(|e| e * e).sum();
                 let error = (error / size).sqrt();
-                println!("{name} {kind} {accuracy:.0e}: {error:.1e}, {} near, built in {built:.2} s", operator.near_pairs() / n);
+                println!("{name} {kind} {accuracy:.0e}: {error:.1e}, {} near each", operator.near_pairs() / n);
+                // Beyond that the dense matrix has errors of its own: moments from 16 radii on leave 1e-6 of an entry,
+                // which charges of random sign see.
+                assert!(error < accuracy + 3e-6, "{name} {kind} at {accuracy:e}: {error:e}");
             }
         }
     }
@@ -188,50 +229,25 @@ fn solutions_are_as_good_as_asked() {
         let right = Mat::from_fn(n, mesh.electrodes.len(), |i, c| f64::from(u8::from(mesh.electrode[i] as usize == c)));
         for tolerance in [1e-3, 1e-4, 1e-6] {
             let (charges, report) = solve_panels(&panels, right.as_ref(), tolerance, &mut |_, _| ()).unwrap();
-            let mut worst = 0.0_f64;
+            let (mut worst, mut total) = (0.0_f64, 0.0_f64);
             for c in 0..right.ncols() {
-                let (mut error, mut size) = (0.0, 0.0);
+                let (mut error, mut size, mut sum, mut all) = (0.0, 0.0, 0.0, 0.0);
                 for i in 0..n {
                     let exact = basis.charge[(i, c)] * crate::constants::COULOMB;
                     error += (charges[(i, c)] - exact).powi(2);
                     size += exact * exact;
+                    sum += charges[(i, c)] - exact;
+                    all += exact.abs();
                 }
                 worst = worst.max((error / size).sqrt());
+                total = total.max((sum / all).abs());
             }
             println!(
                 "{name} {tolerance:.0e}: {worst:.1e} after {} iterations, {:.2} {:.2} {:.2} s",
                 report.iterations, report.operator_seconds, report.inverse_seconds, report.solve_seconds
             );
-        }
-    }
-}
-
-#[test]
-#[ignore]
-fn schemes() {
-    use super::operator::{PanelOperator, Scheme};
-    use crate::linear_operator::GalerkinOperator;
-    for (name, mesh) in meshes(3000) {
-        let panels = panels_of(&mesh);
-        let n = panels.len();
-        let mut r = random(3);
-        let x = Mat::from_fn(n, 1, |i, _| panels[i].area * (r() - 0.5));
-        let xs: Vec<f64> = x.col(0).iter().copied().collect();
-        let judge = GalerkinOperator { panels: &panels };
-        let rows: Vec<usize> = (0..n).step_by(7).collect();
-        let exact: Vec<f64> = rows.iter().map(|&i| judge.row(i, &xs)).collect();
-        let best = PanelOperator::with_scheme(&panels, Scheme { degree: 8, near: 3.0, rules_from: 3.0, accuracy: 1e-8, single: false }).unwrap().apply_columns(x.as_ref());
-        for degree in [1, 2, 3, 4, 5, 6] {
-            for near in [1.5, 2.0, 3.0] {
-                let y = PanelOperator::with_scheme(&panels, Scheme { degree, near, rules_from: 3.0, accuracy: 1e-7, single: false }).unwrap().apply_columns(x.as_ref());
-                let (mut e1, mut e2, mut size) = (0.0, 0.0, 0.0);
-                for (&i, e) in rows.iter().zip(&exact) {
-                    e1 += (y[(i, 0)] - e).powi(2);
-                    e2 += (y[(i, 0)] - best[(i, 0)]).powi(2);
-                    size += e * e;
-                }
-                println!("{name} degree {degree} near {near}: dense {:.1e} best {:.1e}", (e1 / size).sqrt(), (e2 / size).sqrt());
-            }
+            // The dense matrix's own errors, 1e-6 of its entries, are 2e-5 of the charges of single panels; in sums they cancel.
+            assert!(worst < tolerance + 3e-5 && total < tolerance, "{name} at {tolerance:e}: {worst:e} {total:e}");
         }
     }
 }
@@ -243,8 +259,8 @@ fn fields_are_those_of_the_panel_sum() {
     for (name, mesh) in meshes(1500) {
         let basis = crate::BoundaryProblem::new(&mesh).solve().unwrap();
         let mut r = random(11);
-        // Far and near, and some on the panels' corners.
-        let mut points: Vec<Vec3> = (0..1500).map(|_| Vec3::new(3.0 * r() - 1.5, 3.0 * r() - 1.5, 3.0 * r() - 1.5)).collect();
+        let mut points: Vec<Vec3> =
+            (0..1500).map(|_| Vec3::new(3.0 * r() - 1.5, 3.0 * r() - 1.5, 3.0 * r() - 1.5)).collect();
         points.extend(basis.panels.iter().step_by(3).map(|p| p.centroid + p.normal * (p.radius * 3.0 * r())));
         let weights = (0..mesh.electrodes.len())
             .map(|e| (0..mesh.electrodes.len()).map(|k| f64::from(u8::from(e == k))).collect())
@@ -253,7 +269,9 @@ fn fields_are_those_of_the_panel_sum() {
         let points: Vec<Vec3> = points.into_iter().filter(|p| judge.inside(p).is_none()).collect();
         let mut samples = Samples::default();
         judge.sample(&points, &mut samples);
-        let charges = Mat::from_fn(basis.panels.len(), mesh.electrodes.len(), |i, c| basis.charge[(i, c)] * crate::constants::COULOMB);
+        let charges = Mat::from_fn(basis.panels.len(), mesh.electrodes.len(), |i, c| {
+            basis.charge[(i, c)] * crate::constants::COULOMB
+        });
         let k = charges.ncols();
         for accuracy in [1e-3, 1e-5, 1e-7] {
             let sums = PanelsAtPoints::new(&basis.panels, &points, accuracy).unwrap();

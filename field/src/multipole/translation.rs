@@ -132,10 +132,8 @@ impl Translations {
         // The eigenvectors come from squares, and squares end at 1e-16.
         let whole = grade.cut < LEAST_CUT;
         let identity = || Mat::<f64>::identity(n, n);
-        let (root, inverse_root) =
-            if whole { (identity(), identity()) } else { gram_roots(degree, &norm, &classes) };
-        let directions: Vec<[i8; 3]> =
-            (0..DIRECTIONS as i8).map(|k| [k / 16, k / 4 % 4, k % 4]).collect();
+        let (root, inverse_root) = if whole { (identity(), identity()) } else { gram_roots(degree, &norm, &classes) };
+        let directions: Vec<[i8; 3]> = (0..DIRECTIONS as i8).map(|k| [k / 16, k / 4 % 4, k % 4]).collect();
         // Halves of directions that exist with several signs.
         let kernels: Vec<Mat<f64>> = directions
             .iter()
@@ -168,7 +166,11 @@ impl Translations {
             }
         }
         let reduced = |kernel: &Mat<f64>| {
-            if kernel.nrows() == 0 || whole { kernel.clone() } else { multiply(&multiply(basis.transpose(), kernel), &basis) }
+            if kernel.nrows() == 0 || whole {
+                kernel.clone()
+            } else {
+                multiply(&multiply(basis.transpose(), kernel), &basis)
+            }
         };
         let across = if grade.single {
             let single = |m: Mat<f64>| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] as f32);
@@ -196,7 +198,10 @@ impl Translations {
     }
 }
 
-fn multiply(a: impl faer::mat::AsMatRef<T = f64, Rows = usize, Cols = usize>, b: impl faer::mat::AsMatRef<T = f64, Rows = usize, Cols = usize>) -> Mat<f64> {
+fn multiply(
+    a: impl faer::mat::AsMatRef<T = f64, Rows = usize, Cols = usize>,
+    b: impl faer::mat::AsMatRef<T = f64, Rows = usize, Cols = usize>,
+) -> Mat<f64> {
     let (a, b) = (a.as_mat_ref(), b.as_mat_ref());
     let (a, b): (MatRef<f64>, MatRef<f64>) = (a.as_dyn_stride(), b.as_dyn_stride());
     let mut c = Mat::zeros(a.nrows(), b.ncols());
@@ -290,7 +295,13 @@ fn to_parent(degree: usize, t: &Vec3) -> Mat<f64> {
                     let column = place(k, order);
                     let one = complex(&shift, l - k, m as isize - order as isize);
                     // The negative order: R_k^{-μ} = (-1)^μ conj R_k^μ.
-                    let odd = if order == 0 { 0.0 } else if order % 2 == 0 { 1.0 } else { -1.0 };
+                    let odd = if order == 0 {
+                        0.0
+                    } else if order % 2 == 0 {
+                        1.0
+                    } else {
+                        -1.0
+                    };
                     let two = complex(&shift, l - k, (m + order) as isize);
                     let two = (odd * two.0, odd * two.1);
                     matrix[(row, column)] = scale * (one.0 + two.0);
@@ -461,8 +472,9 @@ mod tests {
         for d in [[2, 0, 0], [-2, 1, 0], [3, -3, -3], [0, -2, 1], [-1, -2, -3]] {
             let c = &matrices[direction_number(d)];
             let s = &translations.signs[sign_number(d)];
-            let sum: f64 =
-                (0..rx.len()).map(|a| (0..ry.len()).map(|b| rx[a] * s[a] * c[(a, b)] * s[b] * ry[b]).sum::<f64>()).sum();
+            let sum: f64 = (0..rx.len())
+                .map(|a| (0..ry.len()).map(|b| rx[a] * s[a] * c[(a, b)] * s[b] * ry[b]).sum::<f64>())
+                .sum();
             let exact = 1.0 / (Vec3::from(d.map(|c| 2.0 * f64::from(c))) + x - y).norm();
             // The degree leaves (1.7/2.8)^11 at worst.
             assert!((sum / exact - 1.0).abs() < 1e-3, "{d:?}: {sum} {exact}, rank {}", translations.rank);

@@ -118,9 +118,9 @@ impl Octree {
     /// A tree; `reach` is empty or holds one distance for each source.
     pub fn new(sources: &[Vec3], targets: &[Vec3], reach: &[f64], shape: &Shape) -> Self {
         let bounds = |points: &[Vec3]| {
-            points.iter().fold((Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)), |(l, h), p| {
-                (l.inf(p), h.sup(p))
-            })
+            points
+                .iter()
+                .fold((Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)), |(l, h), p| (l.inf(p), h.sup(p)))
         };
         let ((l1, h1), (l2, h2)) = (bounds(sources), bounds(targets));
         let (low, high) = (l1.inf(&l2), h1.sup(&h2));
