@@ -67,6 +67,7 @@ pub mod gather;
 pub mod harmonics;
 pub mod influence;
 pub mod linear_operator;
+pub mod multipole;
 pub mod panel;
 mod panel_groups;
 pub mod panel_sum;
