@@ -114,6 +114,25 @@ impl Cache {
         Self { folder: folder.to_owned(), shared: true, fresh }
     }
 
+    /// Makes a shared folder if need be: better to know now than after the work.
+    ///
+    /// # Errors
+    /// It cannot be made or written to.
+    pub fn prepare(&self) -> Result<(), Failure> {
+        if !self.shared {
+            return Ok(());
+        }
+        let probe = self.folder.join(format!(".probe-{}.partial", std::process::id()));
+        let made =
+            fs::create_dir_all(&self.folder).and_then(|()| File::create(&probe)).map(|_| fs::remove_file(&probe));
+        made.map(|_| ()).map_err(|error| {
+            let reason = error.to_string();
+            let reason = reason.split(" (os error").next().unwrap_or_default().to_lowercase();
+            let problem = format!("the cache folder {} cannot be written: {reason}", self.folder.display());
+            Failure::run(problem, "give another one with --cache DIR, or none")
+        })
+    }
+
     fn path(&self, kind: Kind, key: &Digest) -> PathBuf {
         let file = self.folder.join(kind.name());
         if !self.shared {

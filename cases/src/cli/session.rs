@@ -52,6 +52,7 @@ impl Session {
 
     /// Makes the output folder, and has interrupts clean it up.
     pub fn output(&self) -> Result<OutputFolder, Failure> {
+        self.cache.prepare()?;
         let out = OutputFolder::create(&self.folder)?;
         interrupt::clean_up_in(self.folder.clone())?;
         Ok(out)

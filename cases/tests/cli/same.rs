@@ -148,6 +148,9 @@ fn cli_every_verb_uses_what_another_one_kept() {
     assert_eq!((with("c", &[]), with("d", &other)), (2, 2));
     assert_same_files(&scratch.at("a"), &scratch.at("c"));
     assert!(!Path::new(&scratch.at("a")).join("cache").exists());
+    let file = scratch.file("file", "mine");
+    let said = graintrap(&["solve", &tiny(), "-o", &out, "--cache", &file]);
+    assert!(said.status == Some(1) && said.err.contains("the cache folder"), "{said:?}");
 }
 
 #[test]
