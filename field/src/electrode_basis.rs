@@ -6,6 +6,7 @@ use faer::Mat;
 use meshes::SurfaceMesh;
 use serde::{Deserialize, Serialize};
 
+use crate::axial::AxialCharge;
 use crate::boundary_problem::SolveReport;
 use crate::capacitance::CapacitanceMatrix;
 use crate::coarse::CoarseCapacitance;
@@ -22,6 +23,8 @@ pub enum SurfaceCharge {
     Panels,
     /// Of high order on the true surface; the panels show it.
     Curved(Arc<CurvedCharge>),
+    /// On generating curves about one axis; the panels show it.
+    Axial(Arc<AxialCharge>),
 }
 
 /// Unit solutions: basis function k is electrode k at 1 V with the others at 0 V; after the electrodes come the sources, each
@@ -107,23 +110,48 @@ impl ElectrodeBasis {
             residual: solution.residual,
             matrix_bytes: solution.matrix_bytes,
         };
-        Self::shown(mesh, sources, ground, Arc::new(solution.charge), capacitance, induced, report)
+        let form = SurfaceCharge::Curved(Arc::new(solution.charge));
+        Self::shown(mesh, sources, ground, form, capacitance, induced, report)
+    }
+
+    /// A solution on generating curves; `mesh` shows it and is what grains strike. `seconds` is what it took.
+    pub fn from_axial(
+        mesh: SurfaceMesh,
+        sources: Vec<Source>,
+        ground: Option<Plane>,
+        charge: AxialCharge,
+        seconds: f64,
+    ) -> Self {
+        let unknowns = charge.solution.unknowns();
+        let report = SolveReport {
+            unknowns,
+            assembly_seconds: 0.0,
+            solve_seconds: seconds,
+            residual: charge.solution.data.misfit,
+            matrix_bytes: 8 * (unknowns * unknowns) as u64,
+        };
+        let (capacitance, induced) = (charge.solution.capacitance.clone(), charge.solution.data.induced.clone());
+        Self::shown(mesh, sources, ground, SurfaceCharge::Axial(Arc::new(charge)), capacitance, induced, report)
     }
 
     fn shown(
         mesh: SurfaceMesh,
         sources: Vec<Source>,
         ground: Option<Plane>,
-        curved: Arc<CurvedCharge>,
+        form: SurfaceCharge,
         capacitance: CapacitanceMatrix,
         induced: Vec<Vec<f64>>,
         report: SolveReport,
     ) -> Self {
         let panels: Vec<Panel> = (0..mesh.panels()).map(|p| Panel::new(mesh.corners(p))).collect();
         let middles: Vec<_> = panels.iter().zip(&mesh.electrode).map(|(p, e)| (p.centroid, *e as usize)).collect();
-        let (densities, functions) = (curved.densities(&middles), curved.functions);
+        let densities = match &form {
+            SurfaceCharge::Panels => Vec::new(),
+            SurfaceCharge::Curved(charge) => charge.densities(&middles),
+            SurfaceCharge::Axial(charge) => charge.densities(&middles),
+        };
+        let functions = mesh.electrodes.len() + sources.len();
         let charge = Mat::from_fn(panels.len(), functions, |p, k| densities[p * functions + k] * panels[p].area);
-        let form = SurfaceCharge::Curved(curved);
         Self { mesh, panels, sources, ground, form, charge, capacitance, induced, coarse: None, report }
     }
 
@@ -179,6 +207,8 @@ enum StoredCharge {
     Panels(Vec<f64>),
     /// Curved elements.
     Curved(CurvedCharge),
+    /// Generating curves.
+    Axial(AxialCharge),
 }
 
 impl From<ElectrodeBasis> for Stored {
@@ -186,6 +216,7 @@ impl From<ElectrodeBasis> for Stored {
         let charge = match &basis.form {
             SurfaceCharge::Panels => StoredCharge::Panels(basis.charges()),
             SurfaceCharge::Curved(charge) => StoredCharge::Curved((**charge).clone()),
+            SurfaceCharge::Axial(charge) => StoredCharge::Axial((**charge).clone()),
         };
         let ElectrodeBasis { mesh, sources, ground, capacitance, induced, report, .. } = basis;
         Self { mesh, sources, ground, charge, capacitance, induced, report }
@@ -214,9 +245,16 @@ impl TryFrom<Stored> for ElectrodeBasis {
             StoredCharge::Curved(charge)
                 if charge.is_whole(electrodes) && charge.functions == electrodes + sources.len() =>
             {
-                Ok(Self::shown(mesh, sources, ground, Arc::new(charge), capacitance, induced, report))
+                let form = SurfaceCharge::Curved(Arc::new(charge));
+                Ok(Self::shown(mesh, sources, ground, form, capacitance, induced, report))
             }
-            StoredCharge::Curved(_) => Err("charges and elements do not fit together"),
+            StoredCharge::Axial(charge)
+                if charge.solution.capacitance == capacitance && charge.solution.data.induced == induced =>
+            {
+                let form = SurfaceCharge::Axial(Arc::new(charge));
+                Ok(Self::shown(mesh, sources, ground, form, capacitance, induced, report))
+            }
+            StoredCharge::Curved(_) | StoredCharge::Axial(_) => Err("charges and elements do not fit together"),
         }
     }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use meshes::{ElectrodeSurface, SurfaceTree, Vec3};
 use rayon::prelude::*;
 
+use crate::axial::AxialSum;
 use crate::constants::COULOMB;
 use crate::curved::CurvedSum;
 use crate::electrode_basis::{ElectrodeBasis, SurfaceCharge};
@@ -39,6 +40,7 @@ pub struct PanelSum {
 enum Charges {
     Panels(PanelGroups),
     Curved(CurvedSum),
+    Axial(AxialSum),
 }
 
 impl Charges {
@@ -48,6 +50,8 @@ impl Charges {
             Self::Panels(panels) => panels.len(),
             // A point charge takes a tenth of a panel's time.
             Self::Curved(elements) => elements.len() / 10,
+            // And a ring as long as a panel.
+            Self::Axial(rings) => rings.rings(),
         }
     }
 
@@ -56,6 +60,7 @@ impl Charges {
         match self {
             Self::Panels(panels) => panels.sum(points),
             Self::Curved(elements) => elements.sum(points),
+            Self::Axial(rings) => rings.sum(points),
         }
     }
 }
@@ -76,6 +81,7 @@ impl PanelSum {
         let charges = match &basis.form {
             SurfaceCharge::Panels => Charges::Panels(PanelGroups::new(&basis.panels, &on_solid, channels, density)),
             SurfaceCharge::Curved(charge) => Charges::Curved(CurvedSum::new(charge, &weights)),
+            SurfaceCharge::Axial(charge) => Charges::Axial(AxialSum::new(&charge.solution, &weights, charge.axis)),
         };
         Self {
             charges,
@@ -152,8 +158,8 @@ impl BasisField for PanelSum {
             let free = |p: &usize| inside[*p].is_none() && !self.below_ground(&points[*p]);
             let outside: Vec<usize> = (0..points.len()).filter(free).collect();
             let sums = self.charges.sum(&outside.iter().map(|&p| points[p]).collect::<Vec<_>>());
-            // What images do to a point their charges do to its image.
-            let images = self.ground.map(|plane| {
+            // What images do to a point their charges do to its image; rings have their images with them.
+            let images = self.ground.filter(|_| !matches!(self.charges, Charges::Axial(_))).map(|plane| {
                 let points: Vec<Vec3> = outside.iter().map(|&p| plane.image(&points[p])).collect();
                 (plane, self.charges.sum(&points))
             });

@@ -2,6 +2,7 @@
 
 use meshes::Vec3;
 
+use crate::axial::AxialPieces;
 use crate::constants::COULOMB;
 use crate::curved::CurvedPieces;
 use crate::electrode_basis::{ElectrodeBasis, SurfaceCharge};
@@ -84,6 +85,7 @@ impl<'a> Pieces<'a> {
                 Surface::Panels(&basis.panels, (0..basis.panels.len()).flat_map(charge).collect(), functions)
             }
             SurfaceCharge::Curved(charge) => Surface::Elements(Box::new(CurvedPieces::new(charge))),
+            SurfaceCharge::Axial(charge) => Surface::Elements(Box::new(AxialPieces::new(charge))),
         };
         Self { surface, ground: basis.ground }
     }

@@ -71,6 +71,26 @@ impl Curve {
         }
     }
 
+    /// Parameter of its point next to a point (distance from the axis, height) near it, from 0 to 1.
+    pub fn nearest(&self, [r, z]: [f64; 2]) -> f64 {
+        let t = match *self {
+            Self::Line { from, to } => {
+                let d = [to[0] - from[0], to[1] - from[1]];
+                ((r - from[0]) * d[0] + (z - from[1]) * d[1]) / (d[0] * d[0] + d[1] * d[1])
+            }
+            Self::Arc { center, from, to, .. } => {
+                let middle = 0.5 * (from + to);
+                let angle = (r - center[0]).atan2(z - center[1]) - middle;
+                (middle + angle.sin().atan2(angle.cos()) - from) / (to - from)
+            }
+            Self::Hyperbola { axes: [a, b], across, from, to } => {
+                let tau = if across { (z / b).asinh() } else { (r / a).asinh() };
+                (tau - from) / (to - from)
+            }
+        };
+        t.clamp(0.0, 1.0)
+    }
+
     /// Its length, m: exact for lines and arcs, to 1e-6 for hyperbolas.
     pub fn length(&self) -> f64 {
         match *self {
@@ -90,7 +110,7 @@ impl Curve {
 }
 
 /// A generating curve: pieces one after the other, with the outside on the left of the direction of travel.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Profile {
     /// Its pieces; each begins where the one before ends.
     pub curves: Vec<Curve>,

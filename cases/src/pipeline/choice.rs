@@ -121,7 +121,7 @@ pub fn choose(case: &Case, source: &CaseSource) -> Result<Choice, Failure> {
         (Method::Auto, _) => (Elements::Curved, "the true surface of every electrode is known"),
     };
     let (solver, why) = match solver {
-        Asked::Auto if AXIAL && elements == Elements::Curved && check_axisymmetric(case, source).is_ok() => {
+        Asked::Auto if elements == Elements::Curved && check_axisymmetric(case, source).is_ok() => {
             (Solver::Axisymmetric, "everything is round about one axis")
         }
         Asked::Auto if elements == Elements::Curved => (Solver::Symmetric, because),
@@ -135,8 +135,6 @@ pub fn choose(case: &Case, source: &CaseSource) -> Result<Choice, Failure> {
     connected(&choice, source)?;
     Ok(choice)
 }
-
-const AXIAL: bool = false;
 
 /// An electrode of which only triangles are known.
 fn flat_only(case: &Case) -> Option<&str> {
@@ -159,7 +157,7 @@ fn asked_name(solver: Asked) -> &'static str {
 fn connected(choice: &Choice, source: &CaseSource) -> Result<(), CaseError> {
     let help = "leave it out";
     let connected = match choice.elements {
-        Elements::Curved => matches!(choice.solver, Solver::Dense | Solver::Symmetric),
+        Elements::Curved => choice.solver != Solver::Multipole,
         Elements::Galerkin | Elements::Collocation => choice.solver == Solver::Dense,
     };
     if !connected {
@@ -188,6 +186,11 @@ fn check_axisymmetric(case: &Case, source: &CaseSource) -> Result<(), CaseError>
         })
     })?;
     let Some(axis) = axis else { return Ok(()) };
+    if let Some(plane) = &case.field.ground
+        && plane.normal.cross(&axis.direction).norm() > ON_AXIS
+    {
+        return Err(refused("the grounded plane does not stand across that of the electrodes".to_owned()));
+    }
     for field in &case.sources {
         let along = |direction: &Vec3| direction.cross(&axis.direction).norm() <= ON_AXIS * direction.norm();
         let centred = axis.distance(&field.placement.center) <= ON_AXIS * axis.size;

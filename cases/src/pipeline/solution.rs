@@ -7,7 +7,7 @@ use field::{BasisField, BoundaryProblem, ElectrodeBasis, Errors, Samples, SolveE
 use meshes::{SurfaceMesh, SurfaceTree, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::choice::{Choice, Elements};
+use super::choice::{Choice, Elements, Solver};
 use super::ready::Ready;
 use super::surface::Electrodes;
 use super::{Failure, Reporter, memory, region};
@@ -62,6 +62,14 @@ pub fn solve(case: &Case, source: &CaseSource, ready: &Ready, reporter: &dyn Rep
     if case.electrodes.is_empty() {
         let basis = work.solve(&ready.mesh, false)?;
         return Ok(work.done(basis, Errors::default(), "closed form"));
+    }
+    if work.choice.solver == Solver::Axisymmetric {
+        if let Some(solution) = work.solve_axial()? {
+            return Ok(solution);
+        }
+        // Not to that accuracy: the whole surface is left.
+        work.choice.solver = Solver::Symmetric;
+        work.choice.why = "on generating curves the accuracy cannot be reached".to_owned();
     }
     if work.choice.elements == Elements::Curved {
         return work.solve_curved();
@@ -121,7 +129,7 @@ pub(super) struct Work<'a> {
     pub(super) reporter: &'a dyn Reporter,
     pub(super) sources: &'a [Source],
     pub(super) electrodes: &'a Electrodes,
-    pub(super) choice: &'a Choice,
+    pub(super) choice: Choice,
     pub(super) warnings: Vec<String>,
     pub(super) mesh_seconds: f64,
     pub(super) solve_seconds: f64,
@@ -135,7 +143,7 @@ impl<'a> Work<'a> {
             reporter,
             sources: &ready.sources,
             electrodes: &ready.electrodes,
-            choice: &ready.choice,
+            choice: ready.choice.clone(),
             warnings: Vec::new(),
             mesh_seconds: 0.0,
             solve_seconds: 0.0,
@@ -307,7 +315,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    pub(super) fn done(mut self, basis: ElectrodeBasis, errors: Errors, estimated_by: &str) -> Solution {
+    pub(super) fn done(&mut self, basis: ElectrodeBasis, errors: Errors, estimated_by: &str) -> Solution {
         let tolerance = errors.capacitance.max(1e-12);
         for defect in basis.capacitance.defects(tolerance) {
             self.warn(format!("the capacitance matrix is not what it must be: {defect}"));
@@ -317,7 +325,7 @@ impl<'a> Work<'a> {
             choice: self.choice.clone(),
             errors,
             estimated_by: estimated_by.to_owned(),
-            warnings: self.warnings,
+            warnings: std::mem::take(&mut self.warnings),
             mesh_seconds: self.mesh_seconds,
             solve_seconds: self.solve_seconds,
             kept: false,

@@ -26,6 +26,7 @@
 //! ```
 
 mod assembly;
+mod charge;
 mod element;
 mod gauss;
 mod ring;
@@ -34,13 +35,16 @@ mod solve;
 mod sum;
 
 use meshes::profile::{Joint, Profile};
+use serde::{Deserialize, Serialize};
 
+pub use charge::AxialCharge;
+pub(crate) use charge::AxialPieces;
 pub use element::Element;
 pub use solution::{AxialData, AxialSolution, FieldDifference};
 pub use sum::{AxialSum, Axis};
 
 /// A conductor that is turned about the common axis.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AxialBody {
     /// Its generating curve.
     pub profile: Profile,

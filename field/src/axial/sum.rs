@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use meshes::Vec3;
 use pulp::Arch;
+use serde::{Deserialize, Serialize};
 
 use super::AxialBody;
 use super::assembly::{LARGEST_ORDER, Nodes, fine_nodes};
@@ -16,7 +17,7 @@ use super::solution::{AxialSolution, density};
 use crate::constants::COULOMB;
 
 /// Where the common axis stands in space.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Axis {
     /// Where heights are zero, m.
     pub origin: Vec3,

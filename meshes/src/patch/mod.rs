@@ -252,7 +252,7 @@ impl Patch {
                 let (x, y, z) = (d.dot(&frame[0]), d.dot(&frame[1]), d.dot(&frame[2]));
                 let middle = 0.5 * (from + to);
                 let turn = (y.atan2(x) - middle).sin().atan2((y.atan2(x) - middle).cos());
-                (nearest_on(curve, [x.hypot(y), z]), (middle + turn - from) / (to - from))
+                (curve.nearest([x.hypot(y), z]), (middle + turn - from) / (to - from))
             }
             PatchForm::Ruled { first, last } => {
                 let (mut u, mut v) = (0.5, 0.5);
@@ -298,26 +298,6 @@ impl Patch {
         };
         Ok(Self { form, sides: self.sides })
     }
-}
-
-/// Parameter of the point of a curve next to a point near it.
-fn nearest_on(curve: &Curve, [r, z]: [f64; 2]) -> f64 {
-    let t = match *curve {
-        Curve::Line { from, to } => {
-            let d = [to[0] - from[0], to[1] - from[1]];
-            ((r - from[0]) * d[0] + (z - from[1]) * d[1]) / (d[0] * d[0] + d[1] * d[1])
-        }
-        Curve::Arc { center, from, to, .. } => {
-            let middle = 0.5 * (from + to);
-            let angle = (r - center[0]).atan2(z - center[1]) - middle;
-            (middle + angle.sin().atan2(angle.cos()) - from) / (to - from)
-        }
-        Curve::Hyperbola { axes: [a, b], across, from, to } => {
-            let tau = if across { (z / b).asinh() } else { (r / a).asinh() };
-            (tau - from) / (to - from)
-        }
-    };
-    t.clamp(0.0, 1.0)
 }
 
 #[cfg(test)]
