@@ -94,7 +94,7 @@ fn grade(accuracy: f64) -> (Grade, Shape) {
 
 /// Points of a leaf for each number of the reduced basis: translations, whose work goes with the square of the rank, take as
 /// long then as near pairs. In double precision they take twice as long.
-const LEAF_SINGLE: f64 = 1.1;
+const LEAF_SINGLE: f64 = 2.0;
 const LEAF_DOUBLE: f64 = 1.6;
 
 /// The tree's shape for a grade.
