@@ -67,14 +67,13 @@ impl InverseRoot for pulp::x86::V4 {
     }
 }
 
-/// Adds the values of all sources in `ranges` at `targets`: output `o` of target `t` to `out[o * stride + t - first]`; the
+/// Adds the values of all sources in `ranges` at the targets of a range: output `o` of target `t` to `out[o * stride + t - first]`; the
 /// outputs of a column are its potential and, with gradients, its three slopes after it.
 pub(super) fn add(
     arch: Arch,
     sources: &Sources,
     ranges: &[Range<u32>],
-    targets: &Coordinates,
-    range: Range<usize>,
+    (targets, range): (&Coordinates, Range<usize>),
     gradients: bool,
     out: &mut [f64],
     stride: usize,

@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::near::{self, Coordinates, Sources};
-use super::solid::{Family, Relative, gather, gradient_forms, padded, parts, scatter};
+use super::solid::{Family, Relative, Scatter, gather, gradient_forms, padded, parts};
 use super::translation::{Grade, Number, Translations, direction_number, sign_number};
 use super::tree::{Lists, Octree, Shape};
 
@@ -94,7 +94,7 @@ fn grade(accuracy: f64) -> (Grade, Shape) {
 
 /// Points of a leaf for each number of the reduced basis: translations, whose work goes with the square of the rank, take as
 /// long then as near pairs. In double precision they take twice as long.
-const LEAF_SINGLE: f64 = 1.1;
+const LEAF_SINGLE: f64 = 2.0;
 const LEAF_DOUBLE: f64 = 1.6;
 
 /// The tree's shape for a grade.
@@ -477,7 +477,8 @@ impl Points {
                 relative.set(self.targets.lists(), range.clone(), &self.tree.center(node), length);
                 let degree = self.translations.degree;
                 let (forms, degree) = forms(family, degree, coefficients, length, k, gradients);
-                scatter(self.arch, family, degree, relative, &forms, outputs, out, range.len());
+                let stride = range.len();
+                Scatter { family, degree, points: relative, forms: &forms, outputs, out, stride }.run(self.arch);
             };
             let size = k * parts(self.translations.degree);
             expansion(leaf, Family::Regular, &locals[leaf * size..(leaf + 1) * size], out);
@@ -490,7 +491,7 @@ impl Points {
                 let direct = &self.lists[n].direct;
                 if !direct.is_empty() {
                     let all = range.clone();
-                    near::add(self.arch, &sources, direct, &self.targets, all, gradients, out, range.len());
+                    near::add(self.arch, &sources, direct, (&self.targets, all), gradients, out, range.len());
                 }
                 if n == 0 {
                     break;

@@ -153,36 +153,29 @@ impl WithSimd for Gather<'_> {
     }
 }
 
-/// Adds the values of forms at points: `forms` holds the `outputs` numbers of each part side by side, filled up with zeros to
-/// `padded(outputs)`; value `o` of point `p` is added to `out[o * stride + p]`.
-pub(super) fn scatter(
-    arch: Arch,
-    family: Family,
-    degree: usize,
-    points: &Relative,
-    forms: &[f64],
-    outputs: usize,
-    out: &mut [f64],
-    stride: usize,
-) {
-    if points.count > 0 {
-        arch.dispatch(Scatter { family, degree, points, forms, outputs, out, stride });
-    }
-}
-
 /// Numbers of outputs as they are stored.
 pub(super) const fn padded(outputs: usize) -> usize {
     outputs.next_multiple_of(TOGETHER)
 }
 
-struct Scatter<'a> {
-    family: Family,
-    degree: usize,
-    points: &'a Relative,
-    forms: &'a [f64],
-    outputs: usize,
-    out: &'a mut [f64],
-    stride: usize,
+/// Values of forms at points, to be added: value `o` of point `p` goes to `out[o * stride + p]`.
+pub(super) struct Scatter<'a> {
+    pub family: Family,
+    pub degree: usize,
+    pub points: &'a Relative,
+    /// The `outputs` numbers of each part side by side, filled up with zeros to `padded(outputs)`.
+    pub forms: &'a [f64],
+    pub outputs: usize,
+    pub out: &'a mut [f64],
+    pub stride: usize,
+}
+
+impl Scatter<'_> {
+    pub fn run(self, arch: Arch) {
+        if self.points.count > 0 {
+            arch.dispatch(self);
+        }
+    }
 }
 
 impl WithSimd for Scatter<'_> {
@@ -236,7 +229,7 @@ pub(super) fn complex(values: &[f64], l: usize, m: isize) -> (f64, f64) {
     match m {
         0 => (values[at], 0.0),
         1.. => (values[at], values[at + 1]),
-        _ if order % 2 == 0 => (values[at], -values[at + 1]),
+        _ if order.is_multiple_of(2) => (values[at], -values[at + 1]),
         _ => (-values[at], values[at + 1]),
     }
 }

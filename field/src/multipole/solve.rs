@@ -79,7 +79,7 @@ const RESIDUAL: f64 = 0.1;
 
 /// Accuracy of the operator over the tolerance, asked of charges of random sign; for those of a solution it is some ten times
 /// better.
-const OPERATOR: f64 = 0.7;
+const OPERATOR: f64 = 1.0;
 
 /// Bytes that [`solve_panels`] needs at its peak for so many panels and right-hand sides, from above for surfaces.
 pub fn bytes_needed(panels: usize, columns: usize, tolerance: f64) -> u64 {

@@ -85,7 +85,7 @@ pub(super) fn some_charges(n: usize) -> Mat<f64> {
     let mut r = random(7);
     let mut charges = Mat::from_fn(n, 2, |_, _| r());
     for i in 0..n {
-        charges[(i, 1)] = charges[(i, 1)] - 0.5;
+        charges[(i, 1)] -= 0.5;
     }
     charges
 }

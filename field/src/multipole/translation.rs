@@ -147,7 +147,7 @@ impl Translations {
                         kernel[(a, b)] /= norm[a] * norm[b];
                     }
                 }
-                if whole { kernel } else { multiply(&multiply(&root, &kernel), &root) }
+                if whole { kernel } else { multiply(multiply(&root, &kernel), &root) }
             })
             .collect();
         let mut total = Mat::<f64>::zeros(n, n);
@@ -169,7 +169,7 @@ impl Translations {
             if kernel.nrows() == 0 || whole {
                 kernel.clone()
             } else {
-                multiply(&multiply(basis.transpose(), kernel), &basis)
+                multiply(multiply(basis.transpose(), kernel), &basis)
             }
         };
         let across = if grade.single {
@@ -230,9 +230,9 @@ fn classes(degree: usize) -> Vec<usize> {
     for l in 0..=degree {
         for m in 0..=l {
             let z = (l + m) % 2;
-            class[place(l, m)] = m % 2 | z << 2;
+            class[place(l, m)] = (m % 2) | (z << 2);
             if m > 0 {
-                class[place(l, m) + 1] = (m + 1) % 2 | 1 << 1 | z << 2;
+                class[place(l, m) + 1] = ((m + 1) % 2) | 2 | (z << 2);
             }
         }
     }

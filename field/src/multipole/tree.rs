@@ -164,7 +164,8 @@ impl Octree {
             parent: 0,
             children: 0..0,
         }];
-        let mut levels = vec![0..1];
+        let mut levels: Vec<Range<usize>> = Vec::new();
+        levels.push(0..1);
         for level in 0..DEEPEST {
             let width = side / f64::from(1_u32 << level);
             let these = levels[level as usize].clone();
