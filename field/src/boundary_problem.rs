@@ -11,15 +11,17 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::capacitance::CapacitanceMatrix;
-use crate::coarse::coarse_capacitance;
+use crate::coarse::{CoarseCapacitance, coarse_capacitance};
 use crate::constants::COULOMB;
 use crate::electrode_basis::{ElectrodeBasis, SurfaceCharge};
 use crate::influence::galerkin;
 use crate::influence::{Testing, potential_coefficients_telling};
 use crate::linear_operator::GalerkinOperator;
+use crate::multipole::IterativeError;
 use crate::panel::{Panel, quadrature};
 use crate::plane::Plane;
 use crate::source::Source;
+use crate::{iterative, reduced};
 
 /// The electrostatic problem of conductors in given outside fields: on each electrode the potential is constant.
 #[derive(Clone, Copy, Debug)]
@@ -32,9 +34,25 @@ pub struct BoundaryProblem<'a> {
     pub testing: Testing,
     /// A grounded plane, with all electrodes above it.
     pub ground: Option<Plane>,
-    /// Solve a coarser problem from the same matrix as well, for an error estimate where the surface cannot be meshed anew
+    /// Find what a coarser charge would have given as well, for an error estimate where the surface cannot be meshed anew
     /// (Galerkin testing only).
     pub with_coarse: bool,
+    /// What solves the equations.
+    pub by: By,
+}
+
+/// What solves the equations of panels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum By {
+    /// A factorised matrix.
+    Dense,
+    /// Factorised matrices for one panel of each orbit of the symmetry there is.
+    Symmetry,
+    /// Iterations with sums by multipoles, Galerkin testing and no grounded plane.
+    Multipoles {
+        /// Of the charges, relative, from 1e-8 to 0.1.
+        tolerance: f64,
+    },
 }
 
 /// Why there is no solution.
@@ -72,6 +90,19 @@ pub enum SolveError {
         /// Its electrode.
         electrode: String,
     },
+    /// It does not fit in memory.
+    #[error("the matrix of {unknowns} unknowns needs {needed} bytes of memory, and {available} may be used")]
+    TooLarge {
+        /// Unknowns after symmetry.
+        unknowns: usize,
+        /// Bytes.
+        needed: u64,
+        /// Bytes.
+        available: u64,
+    },
+    /// Iterations did not arrive.
+    #[error(transparent)]
+    Iterative(#[from] IterativeError),
     /// The charges do not reproduce the voltages they were asked for.
     #[error(
         "the solution misses its voltages by {residual:.1e} V per V (asked {asked:.0e}): panels of very different size or almost on each other?"
@@ -96,6 +127,8 @@ const CHECKED_ROWS: usize = 64;
 pub struct SolveReport {
     /// Number of unknowns.
     pub unknowns: usize,
+    /// Iterations; none where a matrix was factorised.
+    pub iterations: usize,
     /// Filling the matrix, s. Not stored: what is kept took no time.
     #[serde(skip)]
     pub assembly_seconds: f64,
@@ -108,13 +141,26 @@ pub struct SolveReport {
     pub matrix_bytes: u64,
 }
 
+/// Charges of panels, in units of charge over Coulomb's constant (V m), and how they were found.
+pub(crate) struct Solved {
+    pub charge: Mat<f64>,
+    pub coarse: Option<CoarseCapacitance>,
+    pub unknowns: usize,
+    pub iterations: usize,
+    /// Of the iterations, relative.
+    pub residual: f64,
+    pub bytes: u64,
+    pub assembly_seconds: f64,
+    pub solve_seconds: f64,
+}
+
 /// Share of the progress bar that filling the matrix takes: a guess, on which nothing but the bar depends.
 const ASSEMBLY: f64 = 0.8;
 
 impl<'a> BoundaryProblem<'a> {
     /// The problem of electrodes alone, with Galerkin testing.
     pub fn new(mesh: &'a SurfaceMesh) -> Self {
-        Self { mesh, sources: &[], testing: Testing::Galerkin, ground: None, with_coarse: false }
+        Self { mesh, sources: &[], testing: Testing::Galerkin, ground: None, with_coarse: false, by: By::Dense }
     }
 
     /// Bytes that [`BoundaryProblem::solve`] needs at its peak for that many panels and right-hand sides: the matrix, its
@@ -155,26 +201,23 @@ impl<'a> BoundaryProblem<'a> {
         {
             return Err(SolveError::OnGround { electrode: name(panel) });
         }
-        let start = Instant::now();
-        let mut charge = self.right_hand_sides(&panels)?;
+        let charge = self.right_hand_sides(&panels)?;
         let wanted = charge.clone();
-        let told = |done| progress(ASSEMBLY * done);
-        let mut matrix = potential_coefficients_telling(&panels, images.as_deref(), self.testing, &told);
-        let assembled = Instant::now();
-        let coarse = (self.with_coarse && self.testing == Testing::Galerkin && !panels.is_empty())
-            .then(|| coarse_capacitance(mesh, &panels, &matrix))
-            .flatten();
-        if !panels.is_empty() {
-            self.factorise_and_solve(&mut matrix, &mut charge, name)?;
-        }
-        let matrix_bytes = 8 * (panels.len() * panels.len()) as u64;
-        drop(matrix);
-        let solved = Instant::now();
-        let residual = match self.testing {
-            Testing::Galerkin => residual(&panels, images.as_deref(), &charge, &wanted),
-            Testing::Collocation => 0.0,
+        let solved = match self.by {
+            By::Dense => self.solve_dense(&panels, images.as_deref(), charge, progress)?,
+            By::Symmetry => reduced::solve(mesh, &panels, images.as_deref(), self.testing, &charge, progress),
+            By::Multipoles { tolerance } => {
+                iterative::solve(mesh, &panels, &charge, tolerance, self.with_coarse, progress)?
+            }
         };
-        if residual > RESIDUAL {
+        let Solved { charge, coarse, .. } = solved;
+        let residual = match (self.testing, self.by) {
+            // Of the true potentials iterations miss what their tolerance lets them.
+            (_, By::Multipoles { .. }) => solved.residual,
+            (Testing::Galerkin, _) => residual(&panels, images.as_deref(), &charge, &wanted),
+            (Testing::Collocation, _) => 0.0,
+        };
+        if residual > RESIDUAL && !matches!(self.by, By::Multipoles { .. }) {
             return Err(SolveError::Residual { residual, asked: RESIDUAL });
         }
         // So far potentials were charges over metres.
@@ -197,12 +240,44 @@ impl<'a> BoundaryProblem<'a> {
             form: SurfaceCharge::Panels,
             charge,
             report: SolveReport {
-                unknowns: mesh.panels(),
-                assembly_seconds: (assembled - start).as_secs_f64(),
-                solve_seconds: (solved - assembled).as_secs_f64(),
+                unknowns: solved.unknowns,
+                iterations: solved.iterations,
+                assembly_seconds: solved.assembly_seconds,
+                solve_seconds: solved.solve_seconds,
                 residual,
-                matrix_bytes,
+                matrix_bytes: solved.bytes,
             },
+        })
+    }
+
+    fn solve_dense(
+        &self,
+        panels: &[Panel],
+        images: Option<&[Panel]>,
+        mut charge: Mat<f64>,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Solved, SolveError> {
+        let mesh = self.mesh;
+        let name = |panel: usize| mesh.electrodes[mesh.electrode[panel] as usize].name.clone();
+        let start = Instant::now();
+        let told = |done| progress(ASSEMBLY * done);
+        let mut matrix = potential_coefficients_telling(panels, images, self.testing, &told);
+        let assembled = Instant::now();
+        let coarse = (self.with_coarse && self.testing == Testing::Galerkin && !panels.is_empty())
+            .then(|| coarse_capacitance(mesh, panels, &matrix))
+            .flatten();
+        if !panels.is_empty() {
+            self.factorise_and_solve(&mut matrix, &mut charge, name)?;
+        }
+        Ok(Solved {
+            charge,
+            coarse,
+            unknowns: panels.len(),
+            iterations: 0,
+            residual: 0.0,
+            bytes: 8 * (panels.len() * panels.len()) as u64,
+            assembly_seconds: (assembled - start).as_secs_f64(),
+            solve_seconds: assembled.elapsed().as_secs_f64(),
         })
     }
 

@@ -22,7 +22,7 @@ pub struct CoarseCapacitance {
 }
 
 /// Group of each panel, and the number of groups.
-fn groups(mesh: &SurfaceMesh) -> (Vec<u32>, usize) {
+pub(crate) fn groups(mesh: &SurfaceMesh) -> (Vec<u32>, usize) {
     let mut neighbours: HashMap<(u32, u32), Vec<u32>> = HashMap::new();
     let edges = |t: &[u32; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])].map(|(a, b)| (a.min(b), a.max(b)));
     for (p, t) in mesh.triangles.iter().enumerate() {

@@ -105,6 +105,7 @@ impl ElectrodeBasis {
         let induced = part(electrodes, electrodes + sources.len());
         let report = SolveReport {
             unknowns: solution.unknowns,
+            iterations: 0,
             assembly_seconds: solution.assembly_seconds,
             solve_seconds: solution.solve_seconds,
             residual: solution.residual,
@@ -125,6 +126,7 @@ impl ElectrodeBasis {
         let unknowns = charge.solution.unknowns();
         let report = SolveReport {
             unknowns,
+            iterations: 0,
             assembly_seconds: 0.0,
             solve_seconds: seconds,
             residual: charge.solution.data.misfit,

@@ -14,8 +14,8 @@ pub struct FieldSettings {
     pub accuracy: f64,
     /// Wanted number of panels in all; `None`: to be chosen.
     pub panels: Option<usize>,
-    /// No more panels than this.
-    pub max_panels: usize,
+    /// No more panels (or unknowns of curved elements) than this; `None`: what the solver can do in some ten seconds.
+    pub max_panels: Option<usize>,
     /// What solves for the charges.
     pub solver: Solver,
     /// What the charges sit on and how the boundary condition is imposed on them.

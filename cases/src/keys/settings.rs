@@ -15,7 +15,8 @@ pub(crate) struct FieldKeys {
     pub accuracy: Option<Fraction>,
     /// Wanted number of panels in all; left out: chosen from the accuracy.
     pub panels: Option<Count>,
-    /// No more panels than this; left out: 8000 (0.5 GB).
+    /// No more panels (or unknowns of curved elements) than this; left out: 8000 where there is a matrix (0.5 GB), 40000 with
+    /// multipoles.
     pub max_panels: Option<Count>,
     /// What solves for the charges; left out: "auto".
     pub solver: Option<Solver>,

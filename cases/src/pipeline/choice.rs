@@ -94,8 +94,8 @@ pub fn choose(case: &Case, source: &CaseSource) -> Result<Choice, Failure> {
     if solver == Asked::Axisymmetric {
         check_axisymmetric(case, source)?;
     }
-    if method == Method::Collocation && !matches!(solver, Asked::Auto | Asked::Dense) {
-        let problem = "\"collocation\" has no symmetric matrix and is solved by the dense one only".to_owned();
+    if method == Method::Collocation && matches!(solver, Asked::Axisymmetric | Asked::Multipole) {
+        let problem = format!("\"collocation\" needs a matrix, and solver = \"{}\" has none", asked_name(solver));
         return Err(refused("field.method", problem, "write solver = \"dense\", or leave out `method`"));
     }
     if method == Method::Galerkin && solver == Asked::Axisymmetric {
@@ -158,7 +158,8 @@ fn connected(choice: &Choice, source: &CaseSource) -> Result<(), CaseError> {
     let help = "leave it out";
     let connected = match choice.elements {
         Elements::Curved => choice.solver != Solver::Multipole,
-        Elements::Galerkin | Elements::Collocation => choice.solver == Solver::Dense,
+        Elements::Galerkin => choice.solver != Solver::Axisymmetric,
+        Elements::Collocation => matches!(choice.solver, Solver::Dense | Solver::Symmetric),
     };
     if !connected {
         let problem = format!("\"{}\" does not go with {} elements", choice.solver.name(), choice.elements.name());

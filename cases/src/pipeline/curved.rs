@@ -21,7 +21,13 @@ impl Work<'_> {
         let names: Vec<String> = self.case.electrodes.iter().map(|e| e.name.clone()).collect();
         let symmetric = self.choice.solver != Solver::Dense;
         let ground = self.case.field.ground;
-        let problem = CurvedProblem { names: &names, sources: self.sources, ground, symmetric };
+        let problem = CurvedProblem {
+            names: &names,
+            sources: self.sources,
+            ground,
+            symmetric,
+            max_bytes: memory::available() / 10 * 9,
+        };
         let start = Instant::now();
         let points = trap_points(self.case, &shown);
         let sources = self.sources;
@@ -40,7 +46,7 @@ impl Work<'_> {
 
     /// Says so when the accuracy was not reached.
     pub(super) fn warn_of_accuracy(&mut self, errors: Errors, unknowns: usize) {
-        let (asked, error, most) = (self.case.field.accuracy, errors.worst(), self.case.field.max_panels);
+        let (asked, error, most) = (self.case.field.accuracy, errors.worst(), self.most());
         // An error that is no number has not met what was asked.
         let met = error <= asked;
         if !met {
@@ -54,7 +60,7 @@ impl Work<'_> {
     fn limit(&self) -> usize {
         // Two matrices at a time, and as much again for the rest.
         let fits = ((memory::available() / 4 / 8) as f64).sqrt() as usize;
-        self.case.field.max_panels.min(fits)
+        self.most().min(fits)
     }
 
     /// The mesh that shows the solution.

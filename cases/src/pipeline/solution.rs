@@ -3,7 +3,8 @@
 use std::time::Instant;
 
 use field::influence::Testing;
-use field::{BasisField, BoundaryProblem, ElectrodeBasis, Errors, Samples, SolveError, Source};
+use field::multipole::bytes_needed;
+use field::{BasisField, BoundaryProblem, By, ElectrodeBasis, Errors, Samples, SolveError, Source};
 use meshes::{SurfaceMesh, SurfaceTree, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -47,6 +48,15 @@ fn first_fineness(accuracy: f64) -> f64 {
 /// time, and fine enough to be in the range where errors fall with the square of the panel size.
 const COARSER: f64 = 1.5;
 
+/// Flat panels from which on iterations are faster than a matrix.
+const MANY: usize = 4_000;
+
+/// A dense matrix of 8000 unknowns takes half a gigabyte and some ten seconds on two cores.
+const MOST_DENSE: usize = 8_000;
+
+/// As long take so many panels with multipoles.
+const MOST_ITERATED: usize = 40_000;
+
 /// Meshes whose panels differ less in size than this tell nothing of the error.
 const NEAREST: f64 = 1.1;
 
@@ -75,6 +85,7 @@ pub fn solve(case: &Case, source: &CaseSource, ready: &Ready, reporter: &dyn Rep
         return work.solve_curved();
     }
     let (mut mesh, mut fineness) = work.starting_mesh()?;
+    work.choose_for(&mesh);
     let pinned = is_pinned(case);
     let mut before: Option<ElectrodeBasis> = None;
     for round in 1.. {
@@ -95,10 +106,12 @@ pub fn solve(case: &Case, source: &CaseSource, ready: &Ready, reporter: &dyn Rep
         // Errors fall with the square of the panel size; more than needed, since the estimate is one and meshes come in steps.
         let mut finer = fineness * (1.3 * error / case.field.accuracy).sqrt().clamp(1.15, 2.5);
         mesh = work.mesh(finer, 1.0)?;
-        if mesh.panels() > case.field.max_panels {
-            finer = work.electrodes.fineness_for(case, source, case.field.max_panels * 19 / 20)?;
+        let most = work.most();
+        if mesh.panels() > most {
+            finer = work.electrodes.fineness_for(case, source, most * 19 / 20)?;
             mesh = work.mesh(finer, 1.0)?;
         }
+        work.choose_for(&mesh);
         if finer <= 1.02 * fineness {
             work.warn_if_missed(error, basis.panels.len());
             return Ok(work.done(basis, errors, how));
@@ -169,8 +182,9 @@ impl<'a> Work<'a> {
             None => first_fineness(case.field.accuracy),
         };
         let mut mesh = self.mesh(fineness, 1.0)?;
-        if !is_pinned(case) && mesh.panels() > case.field.max_panels && !self.electrodes.any_imported() {
-            fineness = self.electrodes.fineness_for(case, source, case.field.max_panels * 19 / 20)?;
+        let most = self.most();
+        if !is_pinned(case) && mesh.panels() > most && !self.electrodes.any_imported() {
+            fineness = self.electrodes.fineness_for(case, source, most * 19 / 20)?;
             mesh = self.mesh(fineness, 1.0)?;
         }
         Ok((mesh, fineness))
@@ -183,12 +197,42 @@ impl<'a> Work<'a> {
             Elements::Collocation => Testing::Collocation,
             Elements::Curved => unreachable!("solved by `solve_curved`"),
         };
-        let problem =
-            BoundaryProblem { mesh, sources: self.sources, testing, ground: self.case.field.ground, with_coarse };
+        let by = match self.choice.solver {
+            Solver::Symmetric => By::Symmetry,
+            Solver::Multipole => By::Multipoles { tolerance: self.tolerance() },
+            Solver::Dense | Solver::Axisymmetric => By::Dense,
+        };
+        let ground = self.case.field.ground;
+        let problem = BoundaryProblem { mesh, sources: self.sources, testing, ground, with_coarse, by };
         let told = problem.solve_telling(&|done| self.reporter.fraction(done));
         let basis = told.map_err(|error| self.explained(error))?;
         self.solve_seconds += start.elapsed().as_secs_f64();
         Ok(basis)
+    }
+
+    /// Relative error of charges that iterations may leave: a tenth of what the field may have.
+    fn tolerance(&self) -> f64 {
+        (0.1 * self.case.field.accuracy).clamp(1e-7, 1e-3)
+    }
+
+    /// Whether the case leaves it to us to take multipoles for flat panels.
+    fn may_iterate(&self) -> bool {
+        let flat = self.choice.elements == Elements::Galerkin && self.case.field.ground.is_none();
+        flat && self.case.field.solver == crate::case::Solver::Auto
+    }
+
+    /// Takes multipoles for many panels, where the case does not say what to take.
+    fn choose_for(&mut self, mesh: &SurfaceMesh) {
+        if self.may_iterate() && mesh.panels() > MANY {
+            self.choice.solver = Solver::Multipole;
+            self.choice.why = format!("{} panels are too many for a matrix", mesh.panels());
+        }
+    }
+
+    /// Largest number of panels that is chosen by itself.
+    pub(super) fn most(&self) -> usize {
+        let iterate = self.choice.solver == Solver::Multipole || self.may_iterate();
+        self.case.field.max_panels.unwrap_or(if iterate { MOST_ITERATED } else { MOST_DENSE })
     }
 
     pub(super) fn explained(&self, error: SolveError) -> Failure {
@@ -206,7 +250,11 @@ impl<'a> Work<'a> {
                 let help = "panels of it may lie on each other or have no area: look at it with `graintrap mesh`";
                 self.source.error_at(&format!("electrode.{electrode}"), text, help).into()
             }
-            SolveError::Residual { .. } => {
+            SolveError::TooLarge { .. } => {
+                let help = "ask for a larger field.accuracy, or leave out what is too fine to matter";
+                self.source.error_at("field", text, help).into()
+            }
+            SolveError::Iterative(_) | SolveError::Residual { .. } => {
                 Failure::run(text, "look at the mesh with `graintrap mesh`; ask for fewer or more panels")
             }
         }
@@ -216,20 +264,28 @@ impl<'a> Work<'a> {
     fn check_size(&self, mesh: &SurfaceMesh) -> Result<(), Failure> {
         let (panels, settings) = (mesh.panels(), &self.case.field);
         let right_hand_sides = self.case.electrodes.len() + self.sources.len();
-        let (needed, free) = (BoundaryProblem::memory_needed(panels, right_hand_sides), memory::available());
+        let iterate = self.choice.solver == Solver::Multipole;
+        let needed = if iterate {
+            bytes_needed(panels, right_hand_sides, self.tolerance())
+        } else {
+            BoundaryProblem::memory_needed(panels, right_hand_sides)
+        };
+        let (free, what) = (memory::available(), if iterate { "sums by multipoles" } else { "their matrix" });
         let help = "use fewer panels: a larger `field.accuracy`, a smaller `field.panels`, or a coarser mesh file";
         if needed > free {
             let (needed, free) = (memory::people(needed), memory::people(free));
-            let problem = format!("{panels} panels need {needed} of memory for their matrix, and {free} are free");
+            let problem = format!("{panels} panels need {needed} of memory for {what}, and {free} are free");
             return Err(self.source.error_at(&self.size_key(), problem, help).into());
         }
         // What the case asks for panel by panel is not bounded by the default.
         let largest = self.case.electrodes.iter().filter_map(|e| e.panels).sum::<usize>() * 13 / 10;
-        if panels > settings.max_panels * 13 / 10 && panels > largest {
+        let most = self.most();
+        let bounded = settings.max_panels.is_some() || !(iterate && self.electrodes.any_imported());
+        let pinned = settings.panels.is_some() && settings.max_panels.is_none();
+        if bounded && !pinned && panels > most * 13 / 10 && panels > largest {
             let needed = memory::people(needed);
             let problem = format!(
-                "the electrodes need {panels} panels ({needed} of memory), more than field.max_panels = {}",
-                settings.max_panels
+                "the electrodes need {panels} panels ({needed} of memory), more than field.max_panels = {most}"
             );
             let help = format!("raise field.max_panels if the machine is large enough, or {help}");
             return Err(self.source.error_at(&self.size_key(), problem, help).into());
@@ -310,7 +366,7 @@ impl<'a> Work<'a> {
         if !met && self.case.field.panels.is_none() {
             self.warn(format!(
                 "the field has an estimated error of {error:.1e} with {panels} panels; {asked:.0e} was asked. Raise field.max_panels (now {}) to come nearer",
-                self.case.field.max_panels
+                self.most()
             ));
         }
     }

@@ -15,8 +15,6 @@ use crate::quantity::Kind;
 /// Wanted relative error of the field: what one usually knows of real electrodes, and what constant charge on a few thousand
 /// panels gives in seconds.
 const FIELD_ACCURACY: f64 = 1e-3;
-/// A dense matrix of 8000 unknowns takes half a gigabyte and some ten seconds on two cores.
-const MAX_PANELS: usize = 8_000;
 /// Wanted relative error of trajectories: well below that of the field, so that it is not noticed beside it.
 const TRACE_ACCURACY: f64 = 1e-6;
 /// "20 degC", K.
@@ -24,8 +22,10 @@ const ROOM_TEMPERATURE: f64 = 293.15;
 
 pub(super) fn field(at: &At, keys: &FieldKeys) -> Result<FieldSettings, CaseError> {
     let panels = keys.panels.map(|panels| panels.count());
-    let max_panels = keys.max_panels.map_or_else(|| MAX_PANELS.max(panels.unwrap_or(0)), |count| count.count());
-    if panels.is_some_and(|panels| panels > max_panels) {
+    let max_panels = keys.max_panels.map(|count| count.count());
+    if let (Some(panels), Some(max_panels)) = (panels, max_panels)
+        && panels > max_panels
+    {
         let problem = format!("{{value}} is more than max_panels = {max_panels}");
         return Err(at.key("panels").error(problem, "raise `max_panels`, or ask for fewer"));
     }

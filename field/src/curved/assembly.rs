@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use super::element::CurvedMesh;
 use super::kernel::{Moments, Precision, Whole, near_moments, own_moments};
 use super::legendre::{MAX_ORDER, Transform, gauss};
-use super::symmetry::Symmetry;
 use crate::plane::Plane;
+use crate::symmetry::Symmetry;
 
 /// What all rows of a matrix share.
 pub struct Assembly<'a> {
@@ -126,18 +126,7 @@ impl<'a> Assembly<'a> {
                 .map(|&target| {
                     let mut row = vec![0.0; n];
                     self.row(target as usize, &mut row);
-                    orbits
-                        .iter()
-                        .map(|(of, unknowns)| {
-                            let mut folded = vec![0.0; unknowns.len()];
-                            for (value, orbit) in row.iter().zip(of) {
-                                if let Some((unknown, sign)) = orbit {
-                                    folded[*unknown as usize] += sign * value;
-                                }
-                            }
-                            folded
-                        })
-                        .collect()
+                    orbits.iter().map(|(of, unknowns)| Symmetry::folded(&row, of, unknowns.len())).collect()
                 })
                 .collect();
             for (k, folded) in rows.into_iter().enumerate() {

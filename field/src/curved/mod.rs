@@ -18,7 +18,6 @@ mod pieces;
 mod refine;
 mod solve;
 mod sum;
-mod symmetry;
 
 pub use charge::CurvedCharge;
 pub use element::{CurvedMesh, Element};

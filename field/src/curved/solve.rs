@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::lu::partial_pivoting as lu;
-use faer::{Mat, Par};
+use faer::Mat;
 use meshes::Vec3;
 use rayon::prelude::*;
 
@@ -13,12 +11,13 @@ use super::charge::CurvedCharge;
 use super::element::CurvedMesh;
 use super::legendre::gauss;
 use super::sum::CurvedSum;
-use super::symmetry::Symmetry;
 use crate::Samples;
 use crate::boundary_problem::SolveError;
 use crate::constants::COULOMB;
+use crate::linear::solve_transposed;
 use crate::plane::Plane;
 use crate::source::Source;
+use crate::symmetry::Symmetry;
 
 /// The electrostatic problem of conductors with curved elements.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +30,8 @@ pub struct CurvedProblem<'a> {
     pub ground: Option<Plane>,
     /// Make use of symmetry where there is any.
     pub symmetric: bool,
+    /// Bytes that may be used.
+    pub max_bytes: u64,
 }
 
 /// Charges of a curved mesh, and what they add up to.
@@ -118,10 +119,12 @@ impl CurvedProblem<'_> {
         let (points, electrode) = (mesh.points(), mesh.electrode_of_points());
         let wanted = self.wanted(mesh, &points, &electrode)?;
         let symmetry = self.symmetry(&points, &electrode, &wanted);
-        let parts: Vec<(u32, Mat<f64>)> = (0..1_u32 << symmetry.mirrors)
-            .map(|sector| (sector, symmetry.part(sector, &wanted)))
-            .filter(|(_, part)| part.col_iter().any(|c| c.iter().any(|v| v.abs() > 1e-14)))
-            .collect();
+        let parts = symmetry.parts(&wanted);
+        let needed = Self::memory_needed(symmetry.representatives.len(), parts.len(), points.len());
+        if needed > self.max_bytes {
+            let (unknowns, available) = (symmetry.representatives.len(), self.max_bytes);
+            return Err(SolveError::TooLarge { unknowns, needed, available });
+        }
         let sectors: Vec<u32> = parts.iter().map(|(sector, _)| *sector).collect();
         let assembly = Assembly::new(mesh, &points, self.ground, accuracy);
         let matrices = assembly.matrices(&symmetry, &sectors, &|f| progress(0.9 * f));
@@ -134,13 +137,7 @@ impl CurvedProblem<'_> {
             matrix_bytes += 8 * (own.len() * own.len()) as u64;
             let mut columns = Mat::from_fn(own.len(), part.ncols(), |i, c| part[(own[i] as usize, c)]);
             solve_transposed(matrix, &mut columns);
-            for c in 0..part.ncols() {
-                for (p, orbit) in of.iter().enumerate() {
-                    if let Some((unknown, sign)) = orbit {
-                        values[(p, c)] += sign * columns[(*unknown as usize, c)];
-                    }
-                }
-            }
+            Symmetry::unfold(&columns, &of, &mut values);
         }
         let each = mesh.order * mesh.order;
         let rule = gauss(mesh.order);
@@ -187,32 +184,4 @@ fn residual(assembly: &Assembly, values: &Mat<f64>, wanted: &Mat<f64>) -> f64 {
             .fold(0.0, f64::max)
     };
     rows.par_iter().map(of_row).reduce(|| 0.0, f64::max)
-}
-
-/// Solves A x = b for the transpose of A, which is overwritten.
-fn solve_transposed(mut matrix: Mat<f64>, columns: &mut Mat<f64>) {
-    let (n, par) = (matrix.nrows(), Par::rayon(0));
-    if n == 0 {
-        return;
-    }
-    let (mut forward, mut backward) = (vec![0_usize; n], vec![0_usize; n]);
-    let mut memory = MemBuffer::new(lu::factor::lu_in_place_scratch::<usize, f64>(n, n, par, Default::default()));
-    let (_, permutation) = lu::factor::lu_in_place(
-        matrix.as_mut(),
-        &mut forward,
-        &mut backward,
-        par,
-        MemStack::new(&mut memory),
-        Default::default(),
-    );
-    let scratch = lu::solve::solve_transpose_in_place_scratch::<usize, f64>(n, columns.ncols(), par);
-    let mut memory = MemBuffer::new(scratch);
-    lu::solve::solve_transpose_in_place(
-        matrix.as_ref(),
-        matrix.as_ref(),
-        permutation,
-        columns.as_mut(),
-        par,
-        MemStack::new(&mut memory),
-    );
 }

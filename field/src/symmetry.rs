@@ -64,6 +64,9 @@ impl Operation {
 /// How far an image may lie from a point, relative to the whole extent.
 const TOLERANCE: f64 = 1e-9;
 
+/// What is left of a potential that vanishes by symmetry, relative.
+const ROUNDING: f64 = 1e-13;
+
 /// Points by place.
 struct Places<'a> {
     points: &'a [Vec3],
@@ -209,8 +212,37 @@ impl Symmetry {
         (of, unknowns)
     }
 
+    /// A row of a matrix with the columns of an orbit added up, for that many unknowns.
+    pub fn folded(row: &[f64], of: &[Option<(u32, f64)>], unknowns: usize) -> Vec<f64> {
+        let mut folded = vec![0.0; unknowns];
+        for (value, orbit) in row.iter().zip(of) {
+            if let Some((unknown, sign)) = orbit {
+                folded[*unknown as usize] += sign * value;
+            }
+        }
+        folded
+    }
+
+    /// Adds a sector's unknowns to the values of all points.
+    pub fn unfold(unknowns: &Mat<f64>, of: &[Option<(u32, f64)>], values: &mut Mat<f64>) {
+        for c in 0..unknowns.ncols() {
+            for (p, orbit) in of.iter().enumerate() {
+                if let Some((unknown, sign)) = orbit {
+                    values[(p, c)] += sign * unknowns[(*unknown as usize, c)];
+                }
+            }
+        }
+    }
+
+    /// The parts of wanted potentials that belong to the sectors; sectors in which nothing is wanted are left out.
+    pub fn parts(&self, wanted: &Mat<f64>) -> Vec<(u32, Mat<f64>)> {
+        let all = (0..1_u32 << self.mirrors).map(|sector| (sector, self.part(sector, wanted)));
+        let largest = |m: &Mat<f64>, c: usize| m.col(c).iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        all.filter(|(_, part)| (0..part.ncols()).any(|c| largest(part, c) > ROUNDING * largest(wanted, c))).collect()
+    }
+
     /// The part of wanted potentials that belongs to a sector.
-    pub fn part(&self, sector: u32, wanted: &Mat<f64>) -> Mat<f64> {
+    fn part(&self, sector: u32, wanted: &Mat<f64>) -> Mat<f64> {
         let signs = self.signs(sector);
         let share = 1.0 / self.order() as f64;
         Mat::from_fn(wanted.nrows(), wanted.ncols(), |p, c| {
