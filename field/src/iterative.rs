@@ -8,7 +8,7 @@ use meshes::SurfaceMesh;
 use crate::boundary_problem::{SolveError, Solved};
 use crate::coarse::{CoarseCapacitance, groups};
 use crate::constants::COULOMB;
-use crate::multipole::{PanelOperator, solve_panels};
+use crate::multipole::{PanelOperator, solve_keeping};
 use crate::panel::Panel;
 
 /// Charges on the panels (V m) for wanted mean potentials, to a relative tolerance.
@@ -30,8 +30,8 @@ pub(crate) fn solve(
         let first = *first.get_or_insert(left.max(1.0 + 1e-9));
         progress((1.0 - left.max(1.0).ln() / first.ln()).clamp(0.0, 1.0));
     };
-    let (charge, report) = solve_panels(panels, wanted.as_ref(), tolerance, &mut told)?;
-    let coarse = if with_coarse { coarser(mesh, panels, &charge)? } else { None };
+    let (charge, report, operator) = solve_keeping(panels, wanted.as_ref(), tolerance, &mut told)?;
+    let coarse = operator.filter(|_| with_coarse).map(|operator| coarser(mesh, panels, &charge, &operator));
     Ok(Solved {
         coarse,
         unknowns: panels.len(),
@@ -44,18 +44,12 @@ pub(crate) fn solve(
     })
 }
 
-/// Accuracy of the energies from which the coarser capacitances come: a few percent of a small difference.
-const ENERGY: f64 = 1e-3;
-
 /// The capacitances of a charge that is constant on groups of panels, from that of the panels.
 ///
 /// Of all such charges the coarse solution is the one nearest to the fine one in energy, and C_fine - C_coarse is the energy
 /// of the difference, δᵀ P δ. For it stands the mean density of each group, which is nearly as near: the difference comes out
 /// somewhat too large. Checked by `coarser_capacitances_of_iterations`.
-fn coarser(mesh: &SurfaceMesh, panels: &[Panel], charge: &Mat<f64>) -> Result<Option<CoarseCapacitance>, SolveError> {
-    if panels.is_empty() {
-        return Ok(None);
-    }
+fn coarser(mesh: &SurfaceMesh, panels: &[Panel], charge: &Mat<f64>, operator: &PanelOperator) -> CoarseCapacitance {
     let (group, count) = groups(mesh);
     let electrodes = mesh.electrodes.len();
     let mut area = vec![0.0; count];
@@ -72,7 +66,6 @@ fn coarser(mesh: &SurfaceMesh, panels: &[Panel], charge: &Mat<f64>) -> Result<Op
             rough[(p, k)] = charge[(p, k)] - total[g as usize] * panels[p].area / area[g as usize];
         }
     }
-    let operator = PanelOperator::new(panels, ENERGY).map_err(crate::multipole::IterativeError::from)?;
     let potential = operator.apply_columns(rough.as_ref());
     let energy = |i: usize, k: usize| -> f64 { (0..panels.len()).map(|p| rough[(p, i)] * potential[(p, k)]).sum() };
     let total = |i: usize, k: usize| -> f64 { mesh.panels_of(i).map(|p| charge[(p, k)]).sum() };
@@ -82,5 +75,5 @@ fn coarser(mesh: &SurfaceMesh, panels: &[Panel], charge: &Mat<f64>) -> Result<Op
             (0..electrodes).map(|k| (mean(&total, k) - mean(&energy, k)) / COULOMB).collect()
         })
         .collect();
-    Ok(Some(CoarseCapacitance { matrix, size_ratio: (panels.len() as f64 / count as f64).sqrt() }))
+    CoarseCapacitance { matrix, size_ratio: (panels.len() as f64 / count as f64).sqrt() }
 }

@@ -4,8 +4,10 @@
 //! * **channel**: a combination of basis functions that share one time dependence;
 //! * **driven field**: channels times their waveforms. Volts enter here and nowhere earlier.
 //!
-//! A surface becomes a [`BoundaryProblem`], its solution an [`ElectrodeBasis`]: charges on every panel for each electrode at
-//! 1 V. The field of these charges is a [`PanelSum`] (exact, slow) or a [`TabulatedField`] (interpolated where that is good,
+//! Charges are found in one of three ways, from the most special to the most general: on generating curves of coaxial bodies
+//! ([`axial`]), on curved elements of the true surface ([`curved`]), or on flat panels, a [`BoundaryProblem`] that is solved by
+//! a matrix, by symmetry, or with sums by multipoles ([`multipole`]). Each gives an [`ElectrodeBasis`]: charges for each
+//! electrode at 1 V. The field of these charges is a [`PanelSum`] (exact, slow) or a [`TabulatedField`] (interpolated where that is good,
 //! exact elsewhere); both are a [`BasisField`], and so is whatever else gives unit potentials at many points at once.
 //!
 //! # A sphere and a ring

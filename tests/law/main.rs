@@ -4,5 +4,6 @@ mod energy;
 mod gauss;
 mod motion;
 mod reciprocity;
+mod solvers;
 mod superposition;
 mod threads;

@@ -42,4 +42,5 @@ mod tree;
 pub use evaluate::{FIELD_ACCURACY, PanelsAtPoints};
 pub use operator::PanelOperator;
 pub use points::{Points, PointsError};
+pub(crate) use solve::solve_keeping;
 pub use solve::{IterativeError, IterativeReport, bytes_needed, solve_panels};

@@ -105,6 +105,20 @@ pub fn solve_panels(
     tolerance: f64,
     progress: &mut dyn FnMut(usize, f64),
 ) -> Result<(Mat<f64>, IterativeReport), IterativeError> {
+    let (charges, report, _) = solve_keeping(panels, right_hand_sides, tolerance, progress)?;
+    Ok((charges, report))
+}
+
+/// A solution, how it went, and the operator, where there is one.
+type Kept<'a> = (Mat<f64>, IterativeReport, Option<PanelOperator<'a>>);
+
+/// As [`solve_panels`], with the operator for whatever else is to be known.
+pub(crate) fn solve_keeping<'a>(
+    panels: &'a [Panel],
+    right_hand_sides: MatRef<'_, f64>,
+    tolerance: f64,
+    progress: &mut dyn FnMut(usize, f64),
+) -> Result<Kept<'a>, IterativeError> {
     if !(1e-8..=0.1).contains(&tolerance) {
         return Err(IterativeError::Tolerance { asked: tolerance });
     }
@@ -122,7 +136,7 @@ pub fn solve_panels(
     let mut charges = Mat::zeros(n, right_hand_sides.ncols());
     let mut report = IterativeReport::default();
     if n == 0 || right_hand_sides.ncols() == 0 {
-        return Ok((charges, report));
+        return Ok((charges, report, None));
     }
     let mut operator = PanelOperator::with_scheme(panels, Scheme::of(OPERATOR * tolerance))?;
     report.operator_seconds = start.elapsed().as_secs_f64();
@@ -158,5 +172,5 @@ pub fn solve_panels(
         report.residual = report.residual.max(outcome.residual);
     }
     report.solve_seconds = start.elapsed().as_secs_f64() - report.operator_seconds - report.inverse_seconds;
-    Ok((charges, report))
+    Ok((charges, report, Some(operator)))
 }
