@@ -28,7 +28,7 @@ pub const TABLE: &str = "cache/table.bin";
 const LARGEST_TABLE: u64 = 2 << 30;
 
 /// Raised when the same case gives other numbers than before, or the stored form changes.
-const EDITION: u32 = 1;
+const EDITION: u32 = 2;
 
 /// A digest: of what a file depends on, or of its content.
 pub type Digest = [u8; 32];

@@ -90,6 +90,14 @@ pub enum SolveError {
         /// Its electrode.
         electrode: String,
     },
+    /// More unknowns than are allowed.
+    #[error("the electrodes need {unknowns} unknowns, more than field.max_panels = {most}")]
+    TooMany {
+        /// Unknowns after symmetry.
+        unknowns: usize,
+        /// How many may be.
+        most: usize,
+    },
     /// It does not fit in memory.
     #[error("the matrix of {unknowns} unknowns needs {needed} bytes of memory, and {available} may be used")]
     TooLarge {

@@ -380,10 +380,13 @@ mod tests {
     #[test]
     fn what_the_case_asks_for_is_chosen_or_refused_at_its_key() {
         let auto = chosen("", "").unwrap();
-        assert_eq!((auto.solver, auto.elements), (Solver::Dense, Elements::Galerkin));
+        assert_eq!((auto.solver, auto.elements), (Solver::Axisymmetric, Elements::Curved));
+        assert!(auto.why.contains("one axis"));
+        let counted = chosen("panels = 500", "").unwrap();
+        assert_eq!((counted.solver, counted.elements), (Solver::Dense, Elements::Galerkin));
         let plain = chosen("method = \"collocation\"", "").unwrap();
         assert_eq!((plain.solver, plain.elements), (Solver::Dense, Elements::Collocation));
-        assert!(plain.why.contains("any shape"));
+        assert!(plain.why.contains("flat panels"), "{}", plain.why);
 
         let plate = "[[electrode]]\nname = \"plate\"\nshape = \"plate\"\nsize = [1, 1]\ncenter = [0, 0, 2]";
         let aside = "[[electrode]]\nname = \"aside\"\nshape = \"sphere\"\nradius = 0.1\ncenter = [3, 0, 0]";
@@ -394,7 +397,7 @@ mod tests {
             (axisymmetric, aside, "field.solver", "`aside` does not stand on that of `left`"),
             (axisymmetric, point, "field.solver", "the source `spot`"),
             ("solver = \"axisymmetric\"\nmethod = \"galerkin\"", "", "field.method", "curves"),
-            ("solver = \"multipole\"\nmethod = \"collocation\"", "", "field.method", "dense"),
+            ("solver = \"multipole\"\nmethod = \"collocation\"", "", "field.method", "needs a matrix"),
         ] {
             let error = chosen(field, more).unwrap_err();
             assert!(error.contains(key) && error.contains(words), "{error}");

@@ -251,6 +251,11 @@ impl<'a> Work<'a> {
                 let help = "panels of it may lie on each other or have no area: look at it with `graintrap mesh`";
                 self.source.error_at(&format!("electrode.{electrode}"), text, help).into()
             }
+            SolveError::TooMany { .. } => {
+                let help =
+                    "raise field.max_panels if the machine is large enough, or leave out what is too fine to matter";
+                self.source.error_at(&self.size_key(), text, help).into()
+            }
             SolveError::TooLarge { .. } => {
                 let help = "ask for a larger field.accuracy, or leave out what is too fine to matter";
                 self.source.error_at("field", text, help).into()

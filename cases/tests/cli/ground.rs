@@ -43,7 +43,7 @@ fn cli_grains_strike_the_ground() {
     // 4 π ε0 a sinh α Σ 1/sinh(n α), cosh α = 4.
     let alpha = 4.0_f64.acosh();
     let images: f64 = (1..100).map(|n| 1.0 / (f64::from(n) * alpha).sinh()).sum();
-    let exact = 1.112_650_055e-10 * 5e-3 * alpha.sinh() * images;
+    let exact = 1.112_650_055_447_870_3e-10 * 5e-3 * alpha.sinh() * images;
     let error = number(&run["capacitance_matrix_farad"][0][0]) / exact - 1.0;
     assert!(error.abs() < number(&run["error_estimate"]), "{error}");
 

@@ -72,6 +72,12 @@ pub fn solve_to(
         elements: graded(patches, &vertices, start, level.depth),
         order: level.order,
     };
+    if mesh.unknowns() > limit {
+        let unknowns = problem.unknowns(&mesh)?;
+        if unknowns > limit {
+            return Err(SolveError::TooMany { unknowns, most: limit });
+        }
+    }
     let mut before: Option<CurvedSolution> = None;
     for round in 1.. {
         // Integrals to a hundredth of what is asked.
@@ -90,10 +96,23 @@ pub fn solve_to(
         }
         level = level.next();
         let elements = graded(patches, &vertices, refined(&solution, accuracy, known.is_some()), level.depth);
-        let finer = CurvedMesh { elements, order: level.order, ..mesh };
-        if let Some(errors) = known.filter(|_| finer.unknowns() / solution.symmetry > limit) {
-            // Nothing better can be had: the error of the coarser one bounds that of the better.
-            return Ok(Refined { solution, errors, judged_by: 0 });
+        let mut finer = CurvedMesh { elements, order: level.order, ..mesh.clone() };
+        // As much smaller by symmetry as the one at hand.
+        let reduction = (mesh.unknowns() / solution.unknowns.max(1)).max(1);
+        if finer.unknowns() / reduction > limit {
+            if let Some(errors) = known {
+                // Nothing better can be had: the error of the coarser one bounds that of the better.
+                return Ok(Refined { solution, errors, judged_by: 0 });
+            }
+            finer = CurvedMesh { order: level.order, ..mesh.clone() };
+            if finer.unknowns() / reduction > limit {
+                // No judge either: one order less errs more.
+                let rough = CurvedMesh { order: (mesh.order - 1).max(1), ..mesh };
+                begins(&rough);
+                let rough = problem.solve(&rough, 0.01 * accuracy, progress)?;
+                let errors = difference(&solution, &rough);
+                return Ok(Refined { solution, errors, judged_by: 0 });
+            }
         }
         mesh = finer;
         before = Some(solution);

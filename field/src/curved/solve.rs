@@ -94,6 +94,16 @@ impl CurvedProblem<'_> {
         Ok(wanted)
     }
 
+    /// Unknowns of each sector of a mesh: its points as far as symmetry leaves them.
+    ///
+    /// # Errors
+    /// A source on an electrode.
+    pub fn unknowns(&self, mesh: &CurvedMesh) -> Result<usize, SolveError> {
+        let (points, electrode) = (mesh.points(), mesh.electrode_of_points());
+        let wanted = self.wanted(mesh, &points, &electrode)?;
+        Ok(self.symmetry(&points, &electrode, &wanted).representatives.len())
+    }
+
     fn symmetry(&self, points: &[Vec3], electrode: &[u32], wanted: &Mat<f64>) -> Symmetry {
         if self.symmetric { Symmetry::find(points, electrode, wanted) } else { Symmetry::none(points.len()) }
     }
