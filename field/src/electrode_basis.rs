@@ -105,7 +105,7 @@ impl ElectrodeBasis {
         let induced = part(electrodes, electrodes + sources.len());
         let report = SolveReport {
             unknowns: solution.unknowns,
-            iterations: 0,
+            iterations: solution.iterations,
             assembly_seconds: solution.assembly_seconds,
             solve_seconds: solution.solve_seconds,
             residual: solution.residual,

@@ -27,6 +27,7 @@ impl Work<'_> {
             ground,
             symmetric,
             max_bytes: memory::available() / 10 * 9,
+            by,
         };
         let start = Instant::now();
         let points = trap_points(self.case, &shown);

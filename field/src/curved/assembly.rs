@@ -15,14 +15,14 @@ use crate::symmetry::Symmetry;
 pub struct Assembly<'a> {
     mesh: &'a CurvedMesh,
     ground: Option<Plane>,
-    precision: Precision,
+    pub precision: Precision,
     transform: Transform,
     /// Coordinates of all points.
     places: [Vec<f64>; 3],
     /// Weight of each point within its element.
-    weights: Vec<f64>,
-    elements: Vec<Whole>,
-    arch: Arch,
+    pub weights: Vec<f64>,
+    pub elements: Vec<Whole>,
+    pub arch: Arch,
 }
 
 impl<'a> Assembly<'a> {
@@ -87,8 +87,9 @@ impl<'a> Assembly<'a> {
         }
     }
 
+    /// The part of a row that belongs to an element near the place, exactly.
     #[inline(always)]
-    fn near(&self, x: &Vec3, target: Option<usize>, e: usize, row: &mut [f64]) {
+    pub fn near(&self, x: &Vec3, target: Option<usize>, e: usize, row: &mut [f64]) {
         let (patch, element) = (self.mesh.patch_of(e), &self.mesh.elements[e]);
         let mut moments: Moments = [[0.0; MAX_ORDER]; MAX_ORDER];
         if let Some(target) = target.filter(|target| target / self.each() == e) {

@@ -12,6 +12,7 @@
 mod assembly;
 mod charge;
 mod element;
+mod iterative;
 mod kernel;
 mod legendre;
 mod pieces;
@@ -23,7 +24,7 @@ pub use charge::CurvedCharge;
 pub use element::{CurvedMesh, Element};
 pub(crate) use pieces::CurvedPieces;
 pub use refine::{Refined, solve_to};
-pub use solve::{CurvedProblem, CurvedSolution};
+pub use solve::{CurvedBy, CurvedProblem, CurvedSolution};
 pub(crate) use sum::CurvedSum;
 
 #[cfg(test)]

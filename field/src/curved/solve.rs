@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::assembly::Assembly;
 use super::charge::CurvedCharge;
 use super::element::CurvedMesh;
+use super::iterative::Iterative;
 use super::legendre::gauss;
 use super::sum::CurvedSum;
 use crate::Samples;
@@ -18,6 +19,21 @@ use crate::linear::solve_transposed;
 use crate::plane::Plane;
 use crate::source::Source;
 use crate::symmetry::Symmetry;
+
+/// How the equations are solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CurvedBy {
+    /// By their matrix up to some thousand unknowns, else by multipoles.
+    #[default]
+    Size,
+    /// By their matrix.
+    Matrix,
+    /// By multipoles and iterations.
+    Multipoles,
+}
+
+/// Unknowns of a sector from which on iterations are faster than a matrix.
+const MANY: usize = 3_000;
 
 /// The electrostatic problem of conductors with curved elements.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +48,8 @@ pub struct CurvedProblem<'a> {
     pub symmetric: bool,
     /// Bytes that may be used.
     pub max_bytes: u64,
+    /// By a matrix or without.
+    pub by: CurvedBy,
 }
 
 /// Charges of a curved mesh, and what they add up to.
@@ -49,6 +67,8 @@ pub struct CurvedSolution {
     pub ground: Option<Plane>,
     /// Largest error of the potential at points that were looked at, V per V.
     pub residual: f64,
+    /// Applications of the operator, all sectors together; none where a matrix was factorised.
+    pub iterations: usize,
     /// Bytes of the matrices.
     pub matrix_bytes: u64,
     /// Filling them, s.
@@ -118,7 +138,7 @@ impl CurvedProblem<'_> {
     /// 0 V. `accuracy` is that of the integrals, relative.
     ///
     /// # Errors
-    /// A source on an electrode.
+    /// A source on an electrode, too little memory, iterations that do not arrive.
     pub fn solve(
         &self,
         mesh: &CurvedMesh,
@@ -130,24 +150,47 @@ impl CurvedProblem<'_> {
         let wanted = self.wanted(mesh, &points, &electrode)?;
         let symmetry = self.symmetry(&points, &electrode, &wanted);
         let parts = symmetry.parts(&wanted);
-        let needed = Self::memory_needed(symmetry.representatives.len(), parts.len(), points.len());
-        if needed > self.max_bytes {
-            let (unknowns, available) = (symmetry.representatives.len(), self.max_bytes);
-            return Err(SolveError::TooLarge { unknowns, needed, available });
-        }
-        let sectors: Vec<u32> = parts.iter().map(|(sector, _)| *sector).collect();
-        let assembly = Assembly::new(mesh, &points, self.ground, accuracy);
-        let matrices = assembly.matrices(&symmetry, &sectors, &|f| progress(0.9 * f));
-        let assembled = std::time::Instant::now();
+        let iterate = match self.by {
+            CurvedBy::Size => symmetry.representatives.len() > MANY,
+            CurvedBy::Matrix => false,
+            CurvedBy::Multipoles => true,
+        };
         let mut values = Mat::<f64>::zeros(points.len(), wanted.ncols());
-        let (mut unknowns, mut matrix_bytes) = (0, 0);
-        for ((sector, part), matrix) in parts.iter().zip(matrices) {
-            let (of, own) = symmetry.orbits(*sector);
-            unknowns += own.len();
-            matrix_bytes += 8 * (own.len() * own.len()) as u64;
-            let mut columns = Mat::from_fn(own.len(), part.ncols(), |i, c| part[(own[i] as usize, c)]);
-            solve_transposed(matrix, &mut columns);
-            Symmetry::unfold(&columns, &of, &mut values);
+        let (mut unknowns, mut matrix_bytes, mut iterations) = (0, 0, 0);
+        let (assembly, assembled);
+        if iterate {
+            assembly = Assembly::new(mesh, &points, self.ground, accuracy);
+            let (columns, most) = (wanted.ncols(), self.max_bytes);
+            let operator =
+                Iterative::new(mesh, &assembly, &points, &symmetry, self.ground, accuracy, columns, most)?;
+            assembled = std::time::Instant::now();
+            progress(0.4);
+            matrix_bytes = operator.bytes();
+            for (s, (sector, part)) in parts.iter().enumerate() {
+                let done = |f: f64| progress(0.4 + 0.6 * (s as f64 + f) / parts.len() as f64);
+                let solved = operator.solve(*sector, part.as_ref(), &done)?;
+                unknowns += solved.values.nrows();
+                iterations += solved.iterations;
+                Symmetry::unfold(&solved.values, &solved.of, &mut values);
+            }
+        } else {
+            let needed = Self::memory_needed(symmetry.representatives.len(), parts.len(), points.len());
+            if needed > self.max_bytes {
+                let (unknowns, available) = (symmetry.representatives.len(), self.max_bytes);
+                return Err(SolveError::TooLarge { unknowns, needed, available });
+            }
+            let sectors: Vec<u32> = parts.iter().map(|(sector, _)| *sector).collect();
+            assembly = Assembly::new(mesh, &points, self.ground, accuracy);
+            let matrices = assembly.matrices(&symmetry, &sectors, &|f| progress(0.9 * f));
+            assembled = std::time::Instant::now();
+            for ((sector, part), matrix) in parts.iter().zip(matrices) {
+                let (of, own) = symmetry.orbits(*sector);
+                unknowns += own.len();
+                matrix_bytes += 8 * (own.len() * own.len()) as u64;
+                let mut columns = Mat::from_fn(own.len(), part.ncols(), |i, c| part[(own[i] as usize, c)]);
+                solve_transposed(matrix, &mut columns);
+                Symmetry::unfold(&columns, &of, &mut values);
+            }
         }
         let each = mesh.order * mesh.order;
         let rule = gauss(mesh.order);
@@ -167,6 +210,7 @@ impl CurvedProblem<'_> {
             unknowns,
             symmetry: symmetry.order(),
             ground: self.ground,
+            iterations,
             matrix_bytes,
             assembly_seconds: (assembled - start).as_secs_f64(),
             solve_seconds: assembled.elapsed().as_secs_f64(),

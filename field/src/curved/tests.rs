@@ -7,7 +7,7 @@ fn solved(shape: &Shape, accuracy: f64) -> Refined {
     let patches = patches(shape).unwrap();
     let electrode = vec![0; patches.len()];
     let names = ["a".to_owned()];
-    let problem = CurvedProblem { names: &names, sources: &[], ground: None, symmetric: true, max_bytes: u64::MAX };
+    let problem = CurvedProblem { names: &names, sources: &[], ground: None, symmetric: true, max_bytes: u64::MAX, by: CurvedBy::Size };
     let difference = |fine: &CurvedSolution, coarse: &CurvedSolution| {
         let capacitance = (coarse.totals[0][0] / fine.totals[0][0] - 1.0).abs();
         crate::Errors { capacitance, field: 0.0 }

@@ -1,9 +1,7 @@
-//! Panels in clusters of neighbours, and which panels are near each other.
+//! Panels or elements in clusters of neighbours, and which of them are near each other.
 
 use meshes::Vec3;
 use std::ops::Range;
-
-use crate::panel::Panel;
 
 /// A box of panels in a binary tree.
 #[derive(Clone, Debug)]
@@ -20,7 +18,7 @@ struct Node {
 
 /// Panels ordered so that each cluster, and each half of the tree above, is compact.
 #[derive(Clone, Debug)]
-pub(super) struct Clusters {
+pub(crate) struct Clusters {
     /// Number of the panel at each place.
     pub order: Vec<u32>,
     nodes: Vec<Node>,
@@ -28,7 +26,9 @@ pub(super) struct Clusters {
 
 impl Clusters {
     /// Halves along the longest side until no cluster has more than `size` panels.
-    pub fn new(panels: &[Panel], size: usize) -> Self {
+    ///
+    /// Each panel is its middle and how far it reaches from there, m.
+    pub fn new(panels: &[(Vec3, f64)], size: usize) -> Self {
         let mut clusters = Self { order: (0..panels.len() as u32).collect(), nodes: Vec::new() };
         if !panels.is_empty() {
             let mut order = std::mem::take(&mut clusters.order);
@@ -38,13 +38,13 @@ impl Clusters {
         clusters
     }
 
-    fn divide(&mut self, panels: &[Panel], order: &mut [u32], first: usize, size: usize) {
-        let panel = |p: &u32| &panels[*p as usize];
-        let start = panel(&order[0]).centroid;
+    fn divide(&mut self, panels: &[(Vec3, f64)], order: &mut [u32], first: usize, size: usize) {
+        let panel = |p: &u32| panels[*p as usize];
+        let start = panel(&order[0]).0;
         let (low, high, radius) = order
             .iter()
             .map(panel)
-            .fold((start, start, 0.0_f64), |(l, h, r), p| (l.inf(&p.centroid), h.sup(&p.centroid), r.max(p.radius)));
+            .fold((start, start, 0.0_f64), |(l, h, r), (x, reach)| (l.inf(&x), h.sup(&x), r.max(reach)));
         let at = self.nodes.len();
         self.nodes.push(Node { low, high, radius, panels: first..first + order.len(), second: 0 });
         if order.len() > size {
@@ -52,7 +52,7 @@ impl Clusters {
             let half = order.len() / 2;
             // Ties are broken by number, so that the order does not depend on the sorting algorithm.
             order.select_nth_unstable_by(half, |p, q| {
-                panel(p).centroid[axis].total_cmp(&panel(q).centroid[axis]).then(p.cmp(q))
+                panel(p).0[axis].total_cmp(&panel(q).0[axis]).then(p.cmp(q))
             });
             let (below, above) = order.split_at_mut(half);
             self.divide(panels, below, first, size);

@@ -50,7 +50,8 @@ impl<'a> PanelsAtPoints<'a> {
     /// See [`PointsError`].
     pub fn new(panels: &'a [Panel], at: &'a [Vec3], accuracy: f64) -> Result<Self, PointsError> {
         let (degree, near) = scheme(accuracy);
-        let clusters = Clusters::new(panels, CLUSTER);
+        let balls: Vec<(Vec3, f64)> = panels.iter().map(|p| (p.centroid, p.radius)).collect();
+        let clusters = Clusters::new(&balls, CLUSTER);
         let rule = quadrature::rule(degree);
         let mut sources = Vec::with_capacity(panels.len() * rule.weights.len());
         let mut reach = Vec::with_capacity(sources.capacity());

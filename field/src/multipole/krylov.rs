@@ -10,7 +10,7 @@ use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
 
 /// What came out.
-pub(super) struct Outcome {
+pub(crate) struct Outcome {
     pub solution: Mat<f64>,
     pub iterations: usize,
     /// Largest residual of a column over its right-hand side, both root mean square.
@@ -25,7 +25,7 @@ const DEPENDENT: f64 = 1e-10;
 
 /// Solves `A x = b` with `A⁻¹ ≈ precondition` until every column's residual is below `tolerance` of its right-hand side, or
 /// the iterations are used up.
-pub(super) fn solve(
+pub(crate) fn solve(
     apply: impl Fn(MatRef<'_, f64>) -> Mat<f64>,
     precondition: impl Fn(MatRef<'_, f64>) -> Mat<f64>,
     right: MatRef<'_, f64>,

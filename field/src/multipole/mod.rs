@@ -25,13 +25,13 @@
 //! ```
 
 mod close;
-mod clusters;
+pub(crate) mod clusters;
 mod evaluate;
-mod krylov;
+pub(crate) mod krylov;
 mod near;
 mod operator;
 mod points;
-mod precondition;
+pub(crate) mod precondition;
 mod solid;
 mod solve;
 #[cfg(test)]

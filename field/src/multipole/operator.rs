@@ -107,7 +107,8 @@ impl<'a> PanelOperator<'a> {
 
     pub(super) fn with_scheme(panels: &'a [Panel], scheme: Scheme) -> Result<Self, PointsError> {
         let rule = quadrature::rule(scheme.degree);
-        let clusters = Clusters::new(panels, CLUSTER);
+        let balls: Vec<(Vec3, f64)> = panels.iter().map(|p| (p.centroid, p.radius)).collect();
+        let clusters = Clusters::new(&balls, CLUSTER);
         let points: Vec<Vec3> =
             clusters.order.iter().flat_map(|&p| rule.on(&panels[p as usize].corners).map(|(x, _)| x)).collect();
         let sum = Points::new(&points, &points, scheme.accuracy)?;

@@ -15,7 +15,7 @@ use super::operator::PanelOperator;
 use crate::panel::Panel;
 
 /// Rows of the inverse for one cluster.
-struct Block {
+pub(crate) struct Block {
     cluster: Range<usize>,
     /// Places of the patch.
     patch: Vec<u32>,
@@ -24,14 +24,26 @@ struct Block {
 }
 
 /// The approximate inverse, in the order of the clusters.
-pub(super) struct Patches {
+pub(crate) struct Patches {
     blocks: Vec<Block>,
 }
 
 /// Most panels of a patch: the work of its factorisation goes with the third power.
 const LARGEST: usize = 160;
 
+impl Block {
+    /// From the rows of the inverse, `cluster × patch`, column-major.
+    pub fn new(cluster: Range<usize>, patch: Vec<u32>, rows: Vec<f32>) -> Self {
+        Self { cluster, patch, rows }
+    }
+}
+
 impl Patches {
+    /// Of blocks whose clusters make up all places.
+    pub fn of(blocks: Vec<Block>) -> Self {
+        Self { blocks }
+    }
+
     pub fn new(operator: &PanelOperator) -> Self {
         let n = operator.panels().len();
         let leaves = operator.clusters.leaves();
