@@ -127,7 +127,8 @@ impl<'a> Iterative<'a> {
             (own, image(&x).map(|x| near_elements(&clusters, &balls, &x, far)).unwrap_or_default())
         };
         // A look at some rows tells how large all will be.
-        let some: Vec<u32> = representatives.iter().step_by(representatives.len().div_ceil(200).max(1)).copied().collect();
+        let some: Vec<u32> =
+            representatives.iter().step_by(representatives.len().div_ceil(200).max(1)).copied().collect();
         let pairs: usize = some.par_iter().map(|&t| lists(t)).map(|(a, b)| a.len() + b.len()).sum();
         let pairs = (pairs as f64 / some.len().max(1) as f64 * representatives.len() as f64 * 1.05) as u64;
         let number = if single { 4 } else { 8 };
@@ -146,8 +147,7 @@ impl<'a> Iterative<'a> {
         if let Some(plane) = &ground {
             targets.extend(representatives.iter().map(|&t| plane.image(&places[t as usize])));
         }
-        let points =
-            Points::new(places, &targets, accuracy.clamp(1e-11, COARSEST)).map_err(IterativeError::Points)?;
+        let points = Points::new(places, &targets, accuracy.clamp(1e-11, COARSEST)).map_err(IterativeError::Points)?;
         let tolerance = (RESIDUAL * accuracy).max(1e-12);
         Ok(Self { mesh, symmetry, places, assembly, grounded: ground.is_some(), points, near, tolerance })
     }
@@ -157,7 +157,7 @@ impl<'a> Iterative<'a> {
         let (u, n, k) = (unknowns as u64, points as u64, columns as u64);
         let digits = (-accuracy.log10()).clamp(3.0, 11.0);
         let patches = 4 * u * PATCH.max(AROUND * each) as u64;
-        let krylov = 8 * u * k * (30.0 + 4.0 * digits) as u64;
+        let krylov = 8 * u * k * (40.0 + 8.0 * digits) as u64;
         // Whole elements of the assembly, the tree, expansions and charges.
         let sums = n * (150 + 2100 / each as u64) + (n + 2 * u) * k * (100.0 + 12.0 * digits * digits) as u64;
         patches + krylov + sums + (256 << 20)

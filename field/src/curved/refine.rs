@@ -6,7 +6,7 @@ use meshes::{Patch, Side, Vec3};
 
 use super::element::{CurvedMesh, Element};
 use super::legendre::{MAX_ORDER, Transform};
-use super::solve::{CurvedProblem, CurvedSolution};
+use super::solve::{CurvedBy, CurvedProblem, CurvedSolution};
 use crate::boundary_problem::SolveError;
 use crate::errors::Errors;
 
@@ -46,7 +46,8 @@ impl Level {
 const ROUNDS: usize = 9;
 
 /// Solves on finer and finer meshes until the error of one is known to be below `accuracy`. `difference(fine, coarse)` tells
-/// the errors of the second if the first were exact; `begins` hears of each mesh before it is solved. `limit` is the largest number of unknowns of a sector.
+/// the errors of the second if the first were exact; `begins` hears of each mesh before it is solved. `limit` is the largest number
+/// of points, or of unknowns of a sector where the problem is to be solved by a matrix.
 ///
 /// # Errors
 /// As [`CurvedProblem::solve`].
@@ -72,8 +73,13 @@ pub fn solve_to(
         elements: graded(patches, &vertices, start, level.depth),
         order: level.order,
     };
+    // Without a matrix points count, not what symmetry leaves of them.
+    let reduced = |points: usize, reduction: usize| match problem.by {
+        CurvedBy::Matrix => points / reduction,
+        CurvedBy::Size | CurvedBy::Multipoles => points,
+    };
     if mesh.unknowns() > limit {
-        let unknowns = problem.unknowns(&mesh)?;
+        let unknowns = if problem.by == CurvedBy::Matrix { problem.unknowns(&mesh)? } else { mesh.unknowns() };
         if unknowns > limit {
             return Err(SolveError::TooMany { unknowns, most: limit });
         }
@@ -99,13 +105,13 @@ pub fn solve_to(
         let mut finer = CurvedMesh { elements, order: level.order, ..mesh.clone() };
         // As much smaller by symmetry as the one at hand.
         let reduction = (mesh.unknowns() / solution.unknowns.max(1)).max(1);
-        if finer.unknowns() / reduction > limit {
+        if reduced(finer.unknowns(), reduction) > limit {
             if let Some(errors) = known {
                 // Nothing better can be had: the error of the coarser one bounds that of the better.
                 return Ok(Refined { solution, errors, judged_by: 0 });
             }
             finer = CurvedMesh { order: level.order, ..mesh.clone() };
-            if finer.unknowns() / reduction > limit {
+            if reduced(finer.unknowns(), reduction) > limit {
                 // No judge either: one order less errs more.
                 let rough = CurvedMesh { order: (mesh.order - 1).max(1), ..mesh };
                 begins(&rough);

@@ -161,8 +161,7 @@ impl CurvedProblem<'_> {
         if iterate {
             assembly = Assembly::new(mesh, &points, self.ground, accuracy);
             let (columns, most) = (wanted.ncols(), self.max_bytes);
-            let operator =
-                Iterative::new(mesh, &assembly, &points, &symmetry, self.ground, accuracy, columns, most)?;
+            let operator = Iterative::new(mesh, &assembly, &points, &symmetry, self.ground, accuracy, columns, most)?;
             assembled = std::time::Instant::now();
             progress(0.4);
             matrix_bytes = operator.bytes();

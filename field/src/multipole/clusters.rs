@@ -51,9 +51,7 @@ impl Clusters {
             let axis = (high - low).imax();
             let half = order.len() / 2;
             // Ties are broken by number, so that the order does not depend on the sorting algorithm.
-            order.select_nth_unstable_by(half, |p, q| {
-                panel(p).0[axis].total_cmp(&panel(q).0[axis]).then(p.cmp(q))
-            });
+            order.select_nth_unstable_by(half, |p, q| panel(p).0[axis].total_cmp(&panel(q).0[axis]).then(p.cmp(q)));
             let (below, above) = order.split_at_mut(half);
             self.divide(panels, below, first, size);
             self.nodes[at].second = self.nodes.len();
