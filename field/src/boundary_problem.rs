@@ -213,7 +213,9 @@ impl<'a> BoundaryProblem<'a> {
         let wanted = charge.clone();
         let solved = match self.by {
             By::Dense => self.solve_dense(&panels, images.as_deref(), charge, progress)?,
-            By::Symmetry => reduced::solve(mesh, &panels, images.as_deref(), self.testing, &charge, progress),
+            By::Symmetry => {
+                reduced::solve(mesh, &panels, images.as_deref(), self.ground.as_ref(), self.testing, &charge, progress)
+            }
             By::Multipoles { tolerance } => {
                 iterative::solve(mesh, &panels, &charge, tolerance, self.with_coarse, progress)?
             }

@@ -10,6 +10,7 @@ use crate::boundary_problem::Solved;
 use crate::influence::{Testing, galerkin};
 use crate::linear::solve_transposed;
 use crate::panel::Panel;
+use crate::plane::Plane;
 use crate::symmetry::Symmetry;
 
 /// Potential of panel `j` (with its image) on panel `i`, 1/m.
@@ -31,13 +32,14 @@ pub(crate) fn solve(
     mesh: &SurfaceMesh,
     panels: &[Panel],
     images: Option<&[Panel]>,
+    ground: Option<&Plane>,
     testing: Testing,
     wanted: &Mat<f64>,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Solved {
     let start = Instant::now();
     let centroids: Vec<Vec3> = panels.iter().map(|panel| panel.centroid).collect();
-    let symmetry = Symmetry::find(&centroids, &mesh.electrode, wanted);
+    let symmetry = Symmetry::find(&centroids, &mesh.electrode, wanted, ground.map(|plane| &plane.normal));
     let mut solved = Solved {
         charge: Mat::zeros(panels.len(), wanted.ncols()),
         coarse: None,

@@ -114,8 +114,9 @@ impl Symmetry {
         Self { images: vec![identity.clone()], parity: vec![0], mirrors: 0, representatives: identity }
     }
 
-    /// Finds the symmetry of points on electrodes with wanted potentials, a column for each problem.
-    pub fn find(points: &[Vec3], electrode: &[u32], wanted: &Mat<f64>) -> Self {
+    /// Finds the symmetry of points on electrodes with wanted potentials, a column for each problem, above a plane with this
+    /// normal if there is one.
+    pub fn find(points: &[Vec3], electrode: &[u32], wanted: &Mat<f64>, plane: Option<&Vec3>) -> Self {
         let Some(first) = points.first() else { return Self::none(0) };
         let (low, high) = points.iter().fold((*first, *first), |(l, h), p| (l.inf(p), h.sup(p)));
         let (center, size) = (0.5 * (low + high), (high - low).norm());
@@ -123,6 +124,10 @@ impl Symmetry {
         let centred: Vec<Vec3> = points.iter().map(|p| p - center).collect();
         let places = Places::new(&centred, (size / (points.len() as f64).cbrt().max(1.0)).max(4.0 * tolerance));
         let image = |operation: &Operation| -> Option<Vec<u32>> {
+            // A plane stays where it is if its normal does: the middle of all points does in any case.
+            if plane.is_some_and(|normal| (operation.apply(normal) - normal).norm() > TOLERANCE) {
+                return None;
+            }
             // A few points decide most cases.
             let probe = |p: usize| places.find(&operation.apply(&centred[p]), tolerance);
             let stride = (points.len() / 16).max(1);
@@ -242,7 +247,7 @@ impl Symmetry {
     }
 
     /// The part of wanted potentials that belongs to a sector.
-    fn part(&self, sector: u32, wanted: &Mat<f64>) -> Mat<f64> {
+    pub(crate) fn part(&self, sector: u32, wanted: &Mat<f64>) -> Mat<f64> {
         let signs = self.signs(sector);
         let share = 1.0 / self.order() as f64;
         Mat::from_fn(wanted.nrows(), wanted.ncols(), |p, c| {

@@ -9,6 +9,7 @@
 //! Source: Atkinson 1997, *The Numerical Solution of Integral Equations of the Second Kind*, chapter 9, for collocation on
 //! curved elements; Duffy 1982 for the singular integrals.
 
+mod apart;
 mod assembly;
 mod charge;
 mod element;

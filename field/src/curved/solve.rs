@@ -125,7 +125,10 @@ impl CurvedProblem<'_> {
     }
 
     fn symmetry(&self, points: &[Vec3], electrode: &[u32], wanted: &Mat<f64>) -> Symmetry {
-        if self.symmetric { Symmetry::find(points, electrode, wanted) } else { Symmetry::none(points.len()) }
+        if !self.symmetric {
+            return Symmetry::none(points.len());
+        }
+        Symmetry::find(points, electrode, wanted, self.ground.as_ref().map(|plane| &plane.normal))
     }
 
     /// Bytes that [`CurvedProblem::solve`] takes for that many unknowns after symmetry in each of some sectors, and points.
