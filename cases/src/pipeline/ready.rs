@@ -4,7 +4,7 @@ use field::{ElectrodeBasis, Grid, PotentialTable, Source};
 use meshes::{SurfaceMesh, SurfaceTree, Vec3};
 use tracer::{Ensemble, Region};
 
-use super::choice::{Choice, choose};
+use super::choice::{Choice, Elements, choose};
 use super::surface::{Electrodes, check_contacts, check_ground};
 use super::{Failure, Reporter, drives, flights, memory, region};
 use crate::CaseSource;
@@ -37,8 +37,11 @@ pub fn ready(case: &Case, source: &CaseSource, reporter: &dyn Reporter) -> Resul
     let mut electrodes = Electrodes::new(case, source, reporter)?;
     let mesh = electrodes.mesh(case, source, 1.0, 1.0)?;
     check_ground(&mesh, case, source)?;
-    check_contacts(&mesh, case, source, reporter)?;
-    electrodes.emphasise_gaps(case, &mesh, reporter);
+    let curved = choice.elements == Elements::Curved;
+    check_contacts(&electrodes, curved, &mesh, case, source, reporter)?;
+    if !curved {
+        electrodes.emphasise_gaps(case, &mesh, reporter);
+    }
     check_table(case, source, &mesh, &sources)?;
     let tree = SurfaceTree::new(&mesh);
     check_sources(case, source, &tree)?;
