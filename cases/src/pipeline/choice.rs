@@ -85,12 +85,6 @@ pub fn choose(case: &Case, source: &CaseSource) -> Result<Choice, Failure> {
         );
         return Err(refused("field.method", problem, "write method = \"galerkin\", or leave it out"));
     }
-    if case.field.ground.is_some() {
-        let help = "leave it out, or leave out `ground` and put a large electrode there";
-        if matches!(solver, Asked::Multipole) {
-            return Err(refused("field.solver", format!("\"{}\" knows no grounded plane", asked_name(solver)), help));
-        }
-    }
     if solver == Asked::Axisymmetric {
         check_axisymmetric(case, source)?;
     }
@@ -115,11 +109,15 @@ pub fn choose(case: &Case, source: &CaseSource) -> Result<Choice, Failure> {
             let method = if method == Method::Galerkin { Elements::Galerkin } else { Elements::Collocation };
             (method, "the case asks for flat panels")
         }
-        (Method::Auto, Asked::Multipole) => (Elements::Galerkin, "multipoles act between flat panels"),
         (Method::Auto, _) if panels => (Elements::Galerkin, "the case says how many panels there are"),
         (Method::Auto, _) if flat.is_some() => (Elements::Galerkin, "of some electrode only triangles are known"),
         (Method::Auto, _) => (Elements::Curved, "the true surface of every electrode is known"),
     };
+    if case.field.ground.is_some() && solver == Asked::Multipole && elements != Elements::Curved {
+        let help = "leave it out, or leave out `ground` and put a large electrode there";
+        let problem = format!("\"{}\" knows no grounded plane with flat panels", asked_name(solver));
+        return Err(refused("field.solver", problem, help));
+    }
     let (solver, why) = match solver {
         Asked::Auto if elements == Elements::Curved && check_axisymmetric(case, source).is_ok() => {
             (Solver::Axisymmetric, "everything is round about one axis")
@@ -157,7 +155,7 @@ fn asked_name(solver: Asked) -> &'static str {
 fn connected(choice: &Choice, source: &CaseSource) -> Result<(), CaseError> {
     let help = "leave it out";
     let connected = match choice.elements {
-        Elements::Curved => choice.solver != Solver::Multipole,
+        Elements::Curved => true,
         Elements::Galerkin => choice.solver != Solver::Axisymmetric,
         Elements::Collocation => matches!(choice.solver, Solver::Dense | Solver::Symmetric),
     };
@@ -380,10 +378,16 @@ mod tests {
     #[test]
     fn what_the_case_asks_for_is_chosen_or_refused_at_its_key() {
         let auto = chosen("", "").unwrap();
-        assert_eq!((auto.solver, auto.elements), (Solver::Dense, Elements::Galerkin));
+        assert_eq!((auto.solver, auto.elements), (Solver::Axisymmetric, Elements::Curved));
         let plain = chosen("method = \"collocation\"", "").unwrap();
         assert_eq!((plain.solver, plain.elements), (Solver::Dense, Elements::Collocation));
-        assert!(plain.why.contains("any shape"));
+        assert!(plain.why.contains("flat panels"));
+        let curved = chosen("solver = \"multipole\"\nmethod = \"curved\"", "").unwrap();
+        assert_eq!((curved.solver, curved.elements), (Solver::Multipole, Elements::Curved));
+        let surface = chosen("solver = \"multipole\"", "").unwrap();
+        assert_eq!((surface.solver, surface.elements), (Solver::Multipole, Elements::Curved));
+        let panels = chosen("solver = \"multipole\"\npanels = 500", "").unwrap();
+        assert_eq!((panels.solver, panels.elements), (Solver::Multipole, Elements::Galerkin));
 
         let plate = "[[electrode]]\nname = \"plate\"\nshape = \"plate\"\nsize = [1, 1]\ncenter = [0, 0, 2]";
         let aside = "[[electrode]]\nname = \"aside\"\nshape = \"sphere\"\nradius = 0.1\ncenter = [3, 0, 0]";

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use field::curved::{CurvedMesh, CurvedProblem, CurvedSolution, solve_to};
+use field::curved::{CurvedBy, CurvedMesh, CurvedProblem, CurvedSolution, solve_to};
 use field::{ElectrodeBasis, Errors, Plane, Samples, Source};
 use meshes::{Patch, SurfaceMesh, Vec3, patches};
 
@@ -20,6 +20,7 @@ impl Work<'_> {
         let (patches, electrode) = self.patches()?;
         let names: Vec<String> = self.case.electrodes.iter().map(|e| e.name.clone()).collect();
         let symmetric = self.choice.solver != Solver::Dense;
+        let by = self.by();
         let ground = self.case.field.ground;
         let problem = CurvedProblem {
             names: &names,
@@ -39,6 +40,10 @@ impl Work<'_> {
         let progress = |done: f64| self.reporter.fraction(done);
         let refined = solve_to(&problem, &patches, &electrode, asked, limit, &difference, &begins, &progress);
         let refined = refined.map_err(|error| self.explained(error))?;
+        if refined.solution.iterations > 0 && self.choice.solver != Solver::Multipole {
+            self.choice.solver = Solver::Multipole;
+            self.choice.why = format!("{} unknowns are too many for a matrix", refined.solution.unknowns);
+        }
         let basis = ElectrodeBasis::from_curved(shown, sources.to_vec(), ground, refined.solution);
         self.solve_seconds += start.elapsed().as_secs_f64();
         self.warn_of_accuracy(refined.errors, basis.report.unknowns);
@@ -57,8 +62,20 @@ impl Work<'_> {
         }
     }
 
-    /// Largest number of unknowns of one matrix: what the case allows, and what fits in memory.
+    /// By a matrix or without, as the case has it.
+    fn by(&self) -> CurvedBy {
+        match self.choice.solver {
+            Solver::Dense => CurvedBy::Matrix,
+            Solver::Multipole => CurvedBy::Multipoles,
+            Solver::Symmetric | Solver::Axisymmetric => CurvedBy::Size,
+        }
+    }
+
+    /// Largest number of points, or of unknowns of a matrix: what the case allows, and what fits in memory.
     fn limit(&self) -> usize {
+        if self.by() != CurvedBy::Matrix {
+            return self.most();
+        }
         // Two matrices at a time, and as much again for the rest.
         let fits = ((memory::available() / 4 / 8) as f64).sqrt() as usize;
         self.most().min(fits)

@@ -57,6 +57,9 @@ const MOST_DENSE: usize = 8_000;
 /// As long take so many panels with multipoles.
 const MOST_ITERATED: usize = 40_000;
 
+/// And so many points of curved elements: ten seconds with symmetry, a minute without.
+const MOST_CURVED: usize = 300_000;
+
 /// Meshes whose panels differ less in size than this tell nothing of the error.
 const NEAREST: f64 = 1.1;
 
@@ -229,8 +232,11 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Largest number of panels that is chosen by itself.
+    /// Largest number of panels, or of points of curved elements, that is chosen by itself.
     pub(super) fn most(&self) -> usize {
+        if self.choice.elements == Elements::Curved && self.choice.solver != Solver::Dense {
+            return self.case.field.max_panels.unwrap_or(MOST_CURVED);
+        }
         let iterate = self.choice.solver == Solver::Multipole || self.may_iterate();
         self.case.field.max_panels.unwrap_or(if iterate { MOST_ITERATED } else { MOST_DENSE })
     }

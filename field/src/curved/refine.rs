@@ -6,7 +6,7 @@ use meshes::{Patch, Side, Vec3};
 
 use super::element::{CurvedMesh, Element};
 use super::legendre::{MAX_ORDER, Transform};
-use super::solve::{CurvedProblem, CurvedSolution};
+use super::solve::{CurvedBy, CurvedProblem, CurvedSolution};
 use crate::boundary_problem::SolveError;
 use crate::errors::Errors;
 
@@ -46,7 +46,8 @@ impl Level {
 const ROUNDS: usize = 9;
 
 /// Solves on finer and finer meshes until the error of one is known to be below `accuracy`. `difference(fine, coarse)` tells
-/// the errors of the second if the first were exact; `begins` hears of each mesh before it is solved. `limit` is the largest number of unknowns of a sector.
+/// the errors of the second if the first were exact; `begins` hears of each mesh before it is solved. `limit` is the largest number
+/// of points, or of unknowns of a sector where the problem is to be solved by a matrix.
 ///
 /// # Errors
 /// As [`CurvedProblem::solve`].
@@ -72,6 +73,10 @@ pub fn solve_to(
         elements: graded(patches, &vertices, start, level.depth),
         order: level.order,
     };
+    let size = |points: usize, symmetry: usize| match problem.by {
+        CurvedBy::Matrix => points / symmetry,
+        CurvedBy::Size | CurvedBy::Multipoles => points,
+    };
     let mut before: Option<CurvedSolution> = None;
     for round in 1.. {
         // Integrals to a hundredth of what is asked.
@@ -89,9 +94,14 @@ pub fn solve_to(
             }
         }
         level = level.next();
-        let elements = graded(patches, &vertices, refined(&solution, accuracy, known.is_some()), level.depth);
+        let mut elements = graded(patches, &vertices, refined(&solution, accuracy, known.is_some()), level.depth);
+        let each = level.order * level.order;
+        if known.is_none() && size(elements.len() * each, solution.symmetry) > limit {
+            // A higher order alone still tells the error.
+            elements.clone_from(&solution.charge.mesh.elements);
+        }
         let finer = CurvedMesh { elements, order: level.order, ..mesh };
-        if let Some(errors) = known.filter(|_| finer.unknowns() / solution.symmetry > limit) {
+        if let Some(errors) = known.filter(|_| size(finer.unknowns(), solution.symmetry) > limit) {
             // Nothing better can be had: the error of the coarser one bounds that of the better.
             return Ok(Refined { solution, errors, judged_by: 0 });
         }

@@ -87,7 +87,7 @@ pub fn bytes_needed(panels: usize, columns: usize, tolerance: f64) -> u64 {
     let digits = (-tolerance.log10()).clamp(1.0, 8.0);
     // Points and sparse entries, patches, expansions of the columns, and the Krylov space.
     let fixed = 1500.0 + 250.0 * digits;
-    let per_column = 8.0 * (12.0 + 4.0 * digits) + 150.0 + 60.0 * digits * digits;
+    let per_column = 8.0 * (12.0 + 8.0 * digits) + 150.0 + 60.0 * digits * digits;
     (n as f64 * (fixed + 900.0 + k as f64 * per_column)) as u64 + (64 << 20)
 }
 
@@ -151,7 +151,7 @@ pub fn solve_panels(
                 charges[(p as usize, first + c)] = outcome.solution[(i, c)];
             }
         }
-        let krylov = 8 * (n * columns * (outcome.iterations + 4)) as u64;
+        let krylov = 8 * (n * columns * (2 * outcome.iterations + 4)) as u64;
         let bytes = operator.bytes() + inverse.bytes() + operator.bytes_applied(columns) + krylov;
         report.bytes = report.bytes.max(bytes);
         report.iterations += outcome.iterations;

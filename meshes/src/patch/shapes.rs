@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_4, TAU};
 
 use super::{Patch, PatchForm, Path, Side};
 use crate::lattice::{hole_lattice, holes_along};
-use crate::profile::{Profile, Revolved, revolved};
+use crate::profile::{Curve, Profile, Revolved, revolved};
 use crate::{GridPattern, Hole, Outline, Shape, Vec3};
 
 /// Sectors of a surface of revolution.
@@ -14,7 +14,12 @@ const SECTORS: usize = 4;
 /// perforated discs, honeycombs.
 pub fn patches(shape: &Shape) -> Option<Vec<Patch>> {
     if let Some(bodies) = revolved(shape) {
-        return Some(bodies.iter().flat_map(turned).collect());
+        // A wire of a grid has charge that repeats with the wires across it.
+        let longest = match *shape {
+            Shape::GridPlate { pitch, .. } => pitch,
+            _ => f64::INFINITY,
+        };
+        return Some(bodies.iter().flat_map(|body| turned(body, longest)).collect());
     }
     match *shape {
         Shape::Plate { size: [a, b], thickness } => {
@@ -38,26 +43,45 @@ pub fn patches(shape: &Shape) -> Option<Vec<Patch>> {
     }
 }
 
-fn turned(body: &Revolved) -> Vec<Patch> {
+/// Patches of a body, straight curves cut into pieces of about `longest`, in m.
+fn turned(body: &Revolved, longest: f64) -> Vec<Patch> {
     let Revolved { profile, center, frame } = body;
     let side = |profile: &Profile, k: usize| Side::of(profile.joint(k));
     let mut all = Vec::new();
     for (k, curve) in profile.curves.iter().enumerate() {
         // Sides in order: a profile leaves the outside on its left, and azimuth runs so that ∂u × ∂v points there.
-        let sides = [side(profile, k), side(profile, k + 1), Side::Smooth, Side::Smooth];
-        for sector in 0..SECTORS {
-            let angle = |s: usize| TAU * s as f64 / SECTORS as f64;
-            let form = PatchForm::Revolved {
-                curve: *curve,
-                center: *center,
-                frame: *frame,
-                from: angle(sector),
-                to: angle(sector + 1),
-            };
-            all.push(Patch { form, sides });
+        let ends = [side(profile, k), side(profile, k + 1)];
+        let pieces = cut(*curve, longest);
+        for (number, curve) in pieces.iter().enumerate() {
+            let inner = |is_end: bool, end: Side| if is_end { end } else { Side::Smooth };
+            let (first, last) = (inner(number == 0, ends[0]), inner(number + 1 == pieces.len(), ends[1]));
+            let sides = [first, last, Side::Smooth, Side::Smooth];
+            for sector in 0..SECTORS {
+                let angle = |s: usize| TAU * s as f64 / SECTORS as f64;
+                let form = PatchForm::Revolved {
+                    curve: *curve,
+                    center: *center,
+                    frame: *frame,
+                    from: angle(sector),
+                    to: angle(sector + 1),
+                };
+                all.push(Patch { form, sides });
+            }
         }
     }
     all
+}
+
+/// Pieces of a straight line of about that length; other curves stay whole.
+fn cut(curve: Curve, longest: f64) -> Vec<Curve> {
+    let Curve::Line { from, to } = curve else { return vec![curve] };
+    let count = (curve.length() / longest).round().max(1.0) as usize;
+    // Measured from the nearer end, so that pieces are mirror images of each other.
+    let at = |k: usize| {
+        let (start, end, s) = if 2 * k <= count { (from, to, k) } else { (to, from, count - k) };
+        [0, 1].map(|i| start[i] + (end[i] - start[i]) * s as f64 / count as f64)
+    };
+    (0..count).map(|k| Curve::Line { from: at(k), to: at(k + 1) }).collect()
 }
 
 /// A range along x and one along y, m.
