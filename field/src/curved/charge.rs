@@ -5,11 +5,13 @@ use std::sync::Arc;
 
 use faer::Mat;
 use meshes::Vec3;
+use rayon::prelude::*;
 
 use super::element::{Ball, CurvedMesh};
 use super::kernel::Moments;
 use super::legendre::{MAX_ORDER, Transform, legendre};
 use crate::constants::COULOMB;
+use crate::multipole::clusters::Clusters;
 
 /// How near to an edge a density is told, as a part of an element.
 const OFF_EDGE: f64 = 1e-3;
@@ -80,27 +82,40 @@ impl CurvedCharge {
         for (e, element) in mesh.elements.iter().enumerate() {
             of_patch[element.patch as usize].push(e);
         }
-        let mut densities = vec![0.0; points.len() * self.functions];
-        for ((point, electrode), out) in points.iter().zip(densities.chunks_exact_mut(self.functions)) {
-            // The patch whose surface is nearest; patches reach some 1.5 of their ball where they bend.
-            let mut best: Option<(f64, usize, [f64; 2])> = None;
-            for (p, ball) in balls.iter().enumerate() {
-                let least = (point - ball.center).norm() - 1.5 * ball.reach;
-                if mesh.electrode[p] as usize != *electrode || best.is_some_and(|(d, ..)| least > d) {
-                    continue;
+        let clusters = Clusters::new(&balls.iter().map(|b| (b.center, b.reach)).collect::<Vec<_>>(), 8);
+        // The patch whose surface is nearest; patches reach some 1.5 of their ball where they bend.
+        let least = |p: u32, point: &Vec3| (point - balls[p as usize].center).norm() - 1.5 * balls[p as usize].reach;
+        let nearest = |candidates: &mut Vec<u32>, point: &Vec3, electrode: usize| -> Option<(usize, [f64; 2])> {
+            candidates.retain(|&p| mesh.electrode[p as usize] as usize == electrode);
+            candidates.sort_by(|a, b| least(*a, point).total_cmp(&least(*b, point)).then(a.cmp(b)));
+            let mut best: Option<(f64, u32, [f64; 2])> = None;
+            for &p in &*candidates {
+                if best.is_some_and(|(d, ..)| least(p, point) > d) {
+                    break;
                 }
-                let at = mesh.patches[p].parameters(point);
-                let distance = (mesh.patches[p].at(at[0], at[1]) - point).norm();
-                if best.is_none_or(|(d, ..)| distance < d) {
+                let at = mesh.patches[p as usize].parameters(point);
+                let distance = (mesh.patches[p as usize].at(at[0], at[1]) - point).norm();
+                // Of equally near ones the first.
+                if best.is_none_or(|(d, q, _)| distance < d || (distance == d && p < q)) {
                     best = Some((distance, p, at));
                 }
             }
-            let Some((_, patch, at)) = best else { continue };
+            best.map(|(_, p, at)| (p as usize, at))
+        };
+        let mut densities = vec![0.0; points.len() * self.functions];
+        densities.par_chunks_mut(self.functions.max(1)).zip(points).for_each(|(out, (point, electrode))| {
+            let mut candidates = Vec::new();
+            clusters.near(point, 0.0, 3.0, |run| candidates.extend(&clusters.order[run]));
+            let found = nearest(&mut candidates, point, *electrode).or_else(|| {
+                candidates = (0..mesh.patches.len() as u32).collect();
+                nearest(&mut candidates, point, *electrode)
+            });
+            let Some((patch, at)) = found else { return };
             let holds = |e: &&usize| {
                 let element = &mesh.elements[**e];
                 (0..2).all(|k| at[k] >= element.low[k] && at[k] <= element.high[k])
             };
-            let Some(&e) = of_patch[patch].iter().find(holds) else { continue };
+            let Some(&e) = of_patch[patch].iter().find(holds) else { return };
             let element = &mesh.elements[e];
             let width = [0, 1].map(|k| element.high[k] - element.low[k]);
             // Off the very edge, where the density is infinite, and off the axis, where charge and area vanish.
@@ -124,7 +139,7 @@ impl CurvedCharge {
                     (0..MAX_ORDER).map(|i| (0..MAX_ORDER).map(|j| c[i][j] * pu[i] * pv[j]).sum::<f64>()).sum();
                 *out = charge / (area * COULOMB);
             }
-        }
+        });
         densities
     }
 }

@@ -10,6 +10,7 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef};
 use meshes::Vec3;
 use rayon::prelude::*;
+use std::collections::HashMap;
 use std::ops::Range;
 
 use super::assembly::Assembly;
@@ -138,10 +139,11 @@ impl<'a> Iterative<'a> {
         if needed > max_bytes {
             return Err(SolveError::TooLarge { unknowns, needed, available: max_bytes });
         }
+        let repeated = Repeated::new(mesh, assembly, places, representatives, accuracy, &|t| lists(t).0);
         let near = if single {
-            Near::Single(rows(assembly, places, representatives, &lists, &image))
+            Near::Single(rows(assembly, places, representatives, &repeated, &lists, &image))
         } else {
-            Near::Double(rows(assembly, places, representatives, &lists, &image))
+            Near::Double(rows(assembly, places, representatives, &repeated, &lists, &image))
         };
         let mut targets: Vec<Vec3> = representatives.iter().map(|&t| places[t as usize]).collect();
         if let Some(plane) = &ground {
@@ -406,11 +408,122 @@ impl<'a> Iterative<'a> {
     }
 }
 
+/// What elements close to a point do there, computed once where it is the same: grids repeat. Where the integral over the
+/// element as a whole is not exact enough, it costs hundreds of times as much.
+struct Repeated {
+    /// For each representative, close elements in order and the number of their values.
+    rows: Vec<Vec<(u32, u32)>>,
+    values: Vec<f64>,
+    each: usize,
+}
+
+/// Elements that differ less than this, relative to their size, are the same but for where they are.
+const SAME: f64 = 1e-9;
+
+/// Integrals finer than this are not taken from another place.
+const REPEATED_TO: f64 = 1e-8;
+
+/// The point within its element, both elements' forms, and from the one to the other in units of [`SAME`].
+type Pair = (u32, u32, u32, [i64; 3]);
+
+impl Repeated {
+    fn new(
+        mesh: &CurvedMesh,
+        assembly: &Assembly,
+        places: &[Vec3],
+        representatives: &[u32],
+        accuracy: f64,
+        list: &(dyn Fn(u32) -> Vec<u32> + Sync),
+    ) -> Self {
+        let each = assembly.weights.len();
+        if accuracy < REPEATED_TO {
+            return Self { rows: Vec::new(), values: Vec::new(), each };
+        }
+        let steps = |v: Vec3, unit: f64| -> [i64; 3] { v.map(|x| (x / (SAME * unit)).round() as i64).into() };
+        // An element's form: where some of its points are.
+        let samples: Vec<Vec<[i64; 3]>> = (0..mesh.elements.len())
+            .into_par_iter()
+            .map(|e| {
+                let (element, patch, ball) = (&mesh.elements[e], mesh.patch_of(e), &assembly.elements[e].ball);
+                let rows = [0.07, 0.31, 0.66, 0.94];
+                let at = |x: f64, y: f64| {
+                    let [xi, eta] = element.parameters(x, y);
+                    steps(patch.at(xi, eta) - ball.center, ball.reach)
+                };
+                let mut samples: Vec<[i64; 3]> = rows.iter().flat_map(|&x| rows.map(|y| at(x, y))).collect();
+                samples.push([(ball.reach.ln() / SAME).round() as i64, 0, 0]);
+                samples
+            })
+            .collect();
+        let mut forms: HashMap<&[[i64; 3]], u32> = HashMap::new();
+        let form: Vec<u32> = samples
+            .iter()
+            .map(|samples| {
+                let next = forms.len() as u32;
+                *forms.entry(samples).or_insert(next)
+            })
+            .collect();
+        let pairs: Vec<Vec<(u32, Pair)>> = representatives
+            .par_iter()
+            .with_min_len(16)
+            .map(|&target| {
+                let (own, local) = (target as usize / each, target % each as u32);
+                let ball = &assembly.elements[own].ball;
+                let x = &places[target as usize];
+                let mut close = list(target);
+                close.retain(|&e| {
+                    let other = &assembly.elements[e as usize].ball;
+                    e as usize == own || (x - other.center).norm() < assembly.precision.accept * other.reach
+                });
+                let pair = |e: u32| {
+                    let arm = assembly.elements[e as usize].ball.center - ball.center;
+                    (e, (local, form[own], form[e as usize], steps(arm, ball.reach)))
+                };
+                close.into_iter().map(pair).collect()
+            })
+            .collect();
+        let mut known: HashMap<Pair, u32> = HashMap::new();
+        let mut first: Vec<(u32, u32)> = Vec::new();
+        let rows = representatives
+            .iter()
+            .zip(pairs)
+            .map(|(&target, pairs)| {
+                pairs
+                    .into_iter()
+                    .map(|(e, pair)| {
+                        let id = *known.entry(pair).or_insert_with(|| {
+                            first.push((target, e));
+                            first.len() as u32 - 1
+                        });
+                        (e, id)
+                    })
+                    .collect()
+            })
+            .collect();
+        let mut values = vec![0.0; first.len() * each];
+        values.par_chunks_mut(each).with_min_len(8).zip(&first).for_each(|(values, &(target, e))| {
+            let x = &places[target as usize];
+            assembly.arch.dispatch(|| assembly.near(x, Some(target as usize), e as usize, values));
+        });
+        Self { rows, values, each }
+    }
+
+    /// Close elements of a row, in order, and the numbers of their values.
+    fn of_row(&self, number: usize) -> std::iter::Peekable<impl Iterator<Item = (u32, u32)> + '_> {
+        self.rows.get(number).into_iter().flatten().copied().peekable()
+    }
+
+    fn values(&self, id: u32) -> &[f64] {
+        &self.values[id as usize * self.each..(id as usize + 1) * self.each]
+    }
+}
+
 /// The rows of all representatives.
 fn rows<T: Number>(
     assembly: &Assembly,
     places: &[Vec3],
     representatives: &[u32],
+    repeated: &Repeated,
     lists: &(dyn Fn(u32) -> (Vec<u32>, Vec<u32>) + Sync),
     image: &(dyn Fn(&Vec3) -> Option<Vec3> + Sync),
 ) -> Vec<Row<T>> {
@@ -419,15 +532,20 @@ fn rows<T: Number>(
     representatives
         .par_iter()
         .with_min_len(8)
-        .map(|&target| {
+        .enumerate()
+        .map(|(number, &target)| {
             let (own, images) = lists(target);
+            let mut known = repeated.of_row(number);
             let mut values: Vec<T> = Vec::with_capacity((own.len() + images.len()) * each);
             let x = places[target as usize];
             let mut exact = vec![0.0; each];
             let mut add = |x: &Vec3, target: Option<usize>, sign: f64, elements: &[u32]| {
                 assembly.arch.dispatch(|| {
                     for &e in elements {
-                        assembly.near(x, target, e as usize, &mut exact);
+                        match known.next_if(|(of, _)| target.is_some() && *of == e) {
+                            Some((_, id)) => exact.copy_from_slice(repeated.values(id)),
+                            None => assembly.near(x, target, e as usize, &mut exact),
+                        }
                         let first = e as usize * each;
                         for k in 0..each {
                             // Source and target at one place do not act on each other by multipoles.
