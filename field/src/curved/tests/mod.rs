@@ -1,6 +1,7 @@
 //! Curved elements against exact values, other solvers, and finer solutions.
 
 mod exact;
+mod iterative;
 mod kernel;
 mod symmetry;
 mod table;
