@@ -210,7 +210,7 @@ enum StoredCharge {
     /// Curved elements.
     Curved(CurvedCharge),
     /// Generating curves.
-    Axial(AxialCharge),
+    Axial(Box<AxialCharge>),
 }
 
 impl From<ElectrodeBasis> for Stored {
@@ -218,7 +218,7 @@ impl From<ElectrodeBasis> for Stored {
         let charge = match &basis.form {
             SurfaceCharge::Panels => StoredCharge::Panels(basis.charges()),
             SurfaceCharge::Curved(charge) => StoredCharge::Curved((**charge).clone()),
-            SurfaceCharge::Axial(charge) => StoredCharge::Axial((**charge).clone()),
+            SurfaceCharge::Axial(charge) => StoredCharge::Axial(Box::new((**charge).clone())),
         };
         let ElectrodeBasis { mesh, sources, ground, capacitance, induced, report, .. } = basis;
         Self { mesh, sources, ground, charge, capacitance, induced, report }
@@ -253,7 +253,7 @@ impl TryFrom<Stored> for ElectrodeBasis {
             StoredCharge::Axial(charge)
                 if charge.solution.capacitance == capacitance && charge.solution.data.induced == induced =>
             {
-                let form = SurfaceCharge::Axial(Arc::new(charge));
+                let form = SurfaceCharge::Axial(Arc::new(*charge));
                 Ok(Self::shown(mesh, sources, ground, form, capacitance, induced, report))
             }
             StoredCharge::Curved(_) | StoredCharge::Axial(_) => Err("charges and elements do not fit together"),

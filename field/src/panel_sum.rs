@@ -40,7 +40,7 @@ pub struct PanelSum {
 enum Charges {
     Panels(PanelGroups),
     Curved(CurvedSum),
-    Axial(AxialSum),
+    Axial(Box<AxialSum>),
 }
 
 impl Charges {
@@ -81,7 +81,9 @@ impl PanelSum {
         let charges = match &basis.form {
             SurfaceCharge::Panels => Charges::Panels(PanelGroups::new(&basis.panels, &on_solid, channels, density)),
             SurfaceCharge::Curved(charge) => Charges::Curved(CurvedSum::new(charge, &weights)),
-            SurfaceCharge::Axial(charge) => Charges::Axial(AxialSum::new(&charge.solution, &weights, charge.axis)),
+            SurfaceCharge::Axial(charge) => {
+                Charges::Axial(Box::new(AxialSum::new(&charge.solution, &weights, charge.axis)))
+            }
         };
         Self {
             charges,

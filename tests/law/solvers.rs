@@ -47,10 +47,9 @@ fn law_symmetry_and_the_whole_matrix_give_the_same_charges() {
             let off = apart(&whole, &reduced);
             println!("{testing:?}: {off:.1e} apart, {} of {} unknowns", reduced.report.unknowns, whole.report.unknowns);
             assert!(off < 1e-9, "{testing:?}: {off}");
-            // Entries of Galerkin's matrix are found to 1e-6 for one of the two orders of a pair: exactly, since both
-            // solvers take the same formula for both.
+            // Diagonals of the triangles keep fewer symmetries than the electrodes have.
             let saved = reduced.report.matrix_bytes as f64 / whole.report.matrix_bytes as f64;
-            assert!(saved < if sources.is_empty() { 0.1 } else { 0.6 }, "{saved}");
+            assert!(saved < if sources.is_empty() { 0.1 } else { 0.8 }, "{saved}");
         }
     }
 }

@@ -106,6 +106,7 @@ impl<'a> Iterative<'a> {
     ///
     /// # Errors
     /// Too little memory.
+    #[allow(clippy::too_many_arguments)]
     pub fn new(
         mesh: &'a CurvedMesh,
         assembly: &'a Assembly<'a>,
@@ -219,6 +220,8 @@ impl<'a> Iterative<'a> {
             );
             iterations += outcome.iterations;
             // Also where it is no number.
+            // A residual that is no number has not arrived either.
+            #[allow(clippy::neg_cmp_op_on_partial_ord)]
             if !(outcome.residual <= self.tolerance) {
                 let (residual, iterations, asked) = (outcome.residual, outcome.iterations, self.tolerance);
                 return Err(IterativeError::NotConverged { residual, iterations, asked }.into());
@@ -331,6 +334,7 @@ impl<'a> Iterative<'a> {
 
     /// Rows of the inverse for a cluster. `places` is `u32::MAX` everywhere and `distances` infinite, and are so again
     /// afterwards.
+    #[allow(clippy::too_many_arguments)]
     fn block<T: Copy + Into<f64>>(
         &self,
         near: &[Row<T>],

@@ -52,6 +52,7 @@ const ROUNDS: usize = 9;
 ///
 /// # Errors
 /// As [`CurvedProblem::solve`].
+#[allow(clippy::too_many_arguments)]
 pub fn solve_to(
     problem: &CurvedProblem,
     patches: &[Patch],
@@ -178,8 +179,8 @@ fn refined(solution: &CurvedSolution, accuracy: f64, missed: bool) -> Vec<Elemen
     for (element, rough) in mesh.elements.iter().zip(&rough) {
         let rounded = rough.map(|r| (r * 1e6 / threshold).round() / 1e6);
         let mut parts = vec![*element];
-        for along in 0..2 {
-            if rounded[along] > 1.0 {
+        for (along, rough) in rounded.into_iter().enumerate() {
+            if rough > 1.0 {
                 parts = parts.iter().flat_map(|part| part.halves(along)).collect();
             }
         }
