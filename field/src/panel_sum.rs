@@ -1,4 +1,5 @@
-//! The field as what it is: the sum over all panels. Exact for the charges found, and judge of every table.
+//! The field as what it is: the sum over all charges, on panels, curved elements or generating curves. Exact for the charges
+//! found, and judge of every table.
 
 use std::sync::Arc;
 
@@ -14,11 +15,11 @@ use crate::plane::Plane;
 use crate::source::Source;
 use crate::{BasisField, Samples};
 
-/// Potentials and gradients of channels by summing over all panels and sources.
+/// Potentials and gradients of channels by summing over all charges and sources.
 ///
 /// Inside a solid electrode the potential is its own and the field zero; on the surface of a solid electrode the field is that
-/// just outside, on a sheet or a hollow electrode the mean of both sides. Closer to a surface than a panel is wide the field repeats the steps of the
-/// charge from panel to panel.
+/// just outside, on a sheet or a hollow electrode the mean of both sides. With flat panels, closer to a surface than a panel is
+/// wide, the field repeats the steps of the charge from panel to panel.
 ///
 /// Above a grounded plane all charges have their images; on the plane the field is that just above, below it there is none.
 pub struct PanelSum {
