@@ -51,6 +51,7 @@ const ROUNDS: usize = 9;
 ///
 /// # Errors
 /// As [`CurvedProblem::solve`].
+#[allow(clippy::too_many_arguments)]
 pub fn solve_to(
     problem: &CurvedProblem,
     patches: &[Patch],
@@ -103,8 +104,9 @@ pub fn solve_to(
     unreachable!("the last round returns")
 }
 
-/// The error of a solution over its difference from a better one: the better one errs as well, by a fifth as much or less.
-const TRUST: f64 = 1.2;
+/// The error of a solution over its difference from a better one: the better one errs as well, by a third as much or less. With
+/// 1.2 a thin rod before a plate was told 9.8e-4 and had 1.9e-3, two grid plates 9.3e-5 and 1.4e-4: both near what was asked.
+const TRUST: f64 = 1.5;
 
 /// How much of the largest roughness an element may have without being divided. With 0.1 instead 16 geometries with narrow gaps
 /// at 1e-3 took 2 to 5 times the time, and three of them ran out of unknowns: most of what was divided did not matter.
