@@ -9,6 +9,9 @@
 //! Source: Atkinson 1997, *The Numerical Solution of Integral Equations of the Second Kind*, chapter 9, for collocation on
 //! curved elements; Duffy 1982 for the singular integrals.
 
+// Sums over small square arrays read as in the formula, and compile to vectors, with indices.
+#![allow(clippy::needless_range_loop)]
+
 mod apart;
 mod assembly;
 mod charge;
