@@ -204,7 +204,6 @@ struct Stored {
 
 /// Charges as they are stored: a variant for each way to represent them.
 #[derive(Serialize, Deserialize)]
-#[allow(clippy::large_enum_variant)]
 enum StoredCharge {
     /// Constant on each panel, C: basis function after basis function.
     Panels(Vec<f64>),

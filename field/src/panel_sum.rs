@@ -38,7 +38,6 @@ pub struct PanelSum {
 }
 
 /// Charges in the form in which they are summed.
-#[allow(clippy::large_enum_variant)]
 enum Charges {
     Panels(PanelGroups),
     Curved(CurvedSum),

@@ -17,19 +17,11 @@ mod assembly;
 mod charge;
 mod element;
 mod iterative;
-// Loops over lanes and coefficients go by index, so that they become vectors.
-#[allow(clippy::needless_range_loop)]
 mod kernel;
-// Loops over lanes and coefficients go by index, so that they become vectors.
-#[allow(clippy::needless_range_loop)]
 mod legendre;
-// Loops over lanes and coefficients go by index, so that they become vectors.
-#[allow(clippy::needless_range_loop)]
 mod pieces;
 mod refine;
 mod solve;
-// Loops over lanes and coefficients go by index, so that they become vectors.
-#[allow(clippy::needless_range_loop)]
 mod sum;
 
 pub use charge::CurvedCharge;
