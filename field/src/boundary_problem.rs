@@ -4,7 +4,6 @@ use std::time::Instant;
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
-use faer::linalg::lu::partial_pivoting as lu;
 use faer::{Mat, Par};
 use meshes::{SurfaceMesh, Vec3};
 use rayon::prelude::*;
@@ -21,7 +20,7 @@ use crate::multipole::IterativeError;
 use crate::panel::{Panel, quadrature};
 use crate::plane::Plane;
 use crate::source::Source;
-use crate::{iterative, reduced};
+use crate::{iterative, linear, reduced};
 
 /// The electrostatic problem of conductors in given outside fields: on each electrode the potential is constant.
 #[derive(Clone, Copy, Debug)]
@@ -271,13 +270,13 @@ impl<'a> BoundaryProblem<'a> {
         let name = |panel: usize| mesh.electrodes[mesh.electrode[panel] as usize].name.clone();
         let start = Instant::now();
         let told = |done| progress(ASSEMBLY * done);
-        let mut matrix = potential_coefficients_telling(panels, images, self.testing, &told);
+        let matrix = potential_coefficients_telling(panels, images, self.testing, &told);
         let assembled = Instant::now();
         let coarse = (self.with_coarse && self.testing == Testing::Galerkin && !panels.is_empty())
             .then(|| coarse_capacitance(mesh, panels, &matrix))
             .flatten();
         if !panels.is_empty() {
-            self.factorise_and_solve(&mut matrix, &mut charge, name)?;
+            self.factorise_and_solve(matrix, &mut charge, name)?;
         }
         Ok(Solved {
             charge,
@@ -318,55 +317,28 @@ impl<'a> BoundaryProblem<'a> {
         Ok(columns)
     }
 
+    /// Solves for every column in place; the matrix is given up.
     fn factorise_and_solve(
         &self,
-        matrix: &mut Mat<f64>,
+        mut matrix: Mat<f64>,
         columns: &mut Mat<f64>,
         name: impl Fn(usize) -> String,
     ) -> Result<(), SolveError> {
         let (n, par) = (matrix.nrows(), Par::rayon(0));
-        match self.testing {
-            Testing::Galerkin => {
-                let scratch = llt::factor::cholesky_in_place_scratch::<f64>(n, par, Default::default());
-                let mut memory = MemBuffer::new(scratch);
-                llt::factor::cholesky_in_place(
-                    matrix.as_mut(),
-                    Default::default(),
-                    par,
-                    MemStack::new(&mut memory),
-                    Default::default(),
-                )
-                .map_err(|llt::factor::LltError::NonPositivePivot { index }| {
-                    SolveError::NotPositiveDefinite { panel: index, electrode: name(index) }
-                })?;
-                let scratch = llt::solve::solve_in_place_scratch::<f64>(n, columns.ncols(), par);
-                let mut memory = MemBuffer::new(scratch);
-                llt::solve::solve_in_place(matrix.as_ref(), columns.as_mut(), par, MemStack::new(&mut memory));
-            }
-            Testing::Collocation => {
-                let (mut forward, mut backward) = (vec![0_usize; n], vec![0_usize; n]);
-                let scratch = lu::factor::lu_in_place_scratch::<usize, f64>(n, n, par, Default::default());
-                let mut memory = MemBuffer::new(scratch);
-                let (_, permutation) = lu::factor::lu_in_place(
-                    matrix.as_mut(),
-                    &mut forward,
-                    &mut backward,
-                    par,
-                    MemStack::new(&mut memory),
-                    Default::default(),
-                );
-                let scratch = lu::solve::solve_in_place_scratch::<usize, f64>(n, columns.ncols(), par);
-                let mut memory = MemBuffer::new(scratch);
-                lu::solve::solve_in_place(
-                    matrix.as_ref(),
-                    matrix.as_ref(),
-                    permutation,
-                    columns.as_mut(),
-                    par,
-                    MemStack::new(&mut memory),
-                );
-            }
+        if self.testing == Testing::Collocation {
+            linear::solve(matrix, columns, par);
+            return Ok(());
         }
+        let mut memory = MemBuffer::new(llt::factor::cholesky_in_place_scratch::<f64>(n, par, Default::default()));
+        let memory = MemStack::new(&mut memory);
+        llt::factor::cholesky_in_place(matrix.as_mut(), Default::default(), par, memory, Default::default()).map_err(
+            |llt::factor::LltError::NonPositivePivot { index }| SolveError::NotPositiveDefinite {
+                panel: index,
+                electrode: name(index),
+            },
+        )?;
+        let mut memory = MemBuffer::new(llt::solve::solve_in_place_scratch::<f64>(n, columns.ncols(), par));
+        llt::solve::solve_in_place(matrix.as_ref(), columns.as_mut(), par, MemStack::new(&mut memory));
         Ok(())
     }
 }

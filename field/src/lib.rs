@@ -66,6 +66,7 @@ pub mod driven;
 pub mod electrode_basis;
 mod errors;
 pub mod gather;
+mod gauss;
 pub mod harmonics;
 pub mod influence;
 mod iterative;

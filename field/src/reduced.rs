@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use faer::Mat;
+use faer::{Mat, Par};
 use meshes::{SurfaceMesh, Vec3};
 use rayon::prelude::*;
 
@@ -77,7 +77,7 @@ pub(crate) fn solve(
         solved.unknowns += own.len();
         solved.bytes += 8 * (own.len() * own.len()) as u64;
         let mut columns = Mat::from_fn(own.len(), part.ncols(), |i, c| part[(own[i] as usize, c)]);
-        solve_transposed(matrix, &mut columns);
+        solve_transposed(matrix, &mut columns, Par::rayon(0));
         Symmetry::unfold(&columns, of, &mut solved.charge);
     }
     solved.solve_seconds = start.elapsed().as_secs_f64() - solved.assembly_seconds;

@@ -58,7 +58,7 @@ const MOST_DENSE: usize = 8_000;
 const MOST_ITERATED: usize = 40_000;
 
 /// And so many points of curved elements: ten seconds with symmetry, a minute without.
-const MOST_CURVED: usize = 300_000;
+const MOST_CURVED: usize = 1_000_000;
 
 /// Meshes whose panels differ less in size than this tell nothing of the error.
 const NEAREST: f64 = 1.1;

@@ -58,7 +58,7 @@ pub(crate) struct Nodes {
 
 impl Nodes {
     pub fn new(element: &Element, bodies: &[AxialBody], rules: &Rules, first: usize) -> Self {
-        let at: Vec<_> = rules.rule(element.order).nodes.iter().map(|&u| element.at(bodies, u)).collect();
+        let at: Vec<_> = rules.rule(element.order).points.iter().map(|&u| element.at(bodies, u)).collect();
         let ends = [0.0, 1.0].map(|u| element.at(bodies, u));
         let length = at.iter().chain(&ends).map(|(_, d)| d[0].hypot(d[1])).fold(0.0, f64::max);
         let center = element.at(bodies, 0.5).0;
@@ -124,7 +124,7 @@ impl Assembly<'_> {
             fresh,
             |(scratch, moments, far_rings), (row, (element, k))| {
                 let point = self.nodes[element].places[k];
-                let u = self.rules.rule(self.elements[element].order).nodes[k];
+                let u = self.rules.rule(self.elements[element].order).points[k];
                 self.add_row(point, Some((element, u)), 1.0, row, (scratch, moments, far_rings));
                 if let Some(height) = self.ground {
                     let image = [point[0], 2.0 * height - point[1]];
@@ -201,7 +201,7 @@ impl Assembly<'_> {
         for k in 0..scratch.cells.len() {
             let cell = scratch.cells[k];
             let width = cell.to - cell.from;
-            for (x, w) in rule.nodes.iter().zip(&rule.weights) {
+            for (x, w) in rule.points.iter().zip(&rule.weights) {
                 let u = cell.from + width * x;
                 scratch.add(element.at(self.bodies, u).0, u, w * width);
             }
@@ -230,7 +230,7 @@ impl Assembly<'_> {
         let rule = self.rules.rule(FINE);
         for (side, room) in [(-1.0, u), (1.0, 1.0 - u)] {
             let first = smooth.min(room).min(SMOOTH_FOR / element.order as f64);
-            for (x, w) in rule.nodes.iter().zip(&rule.weights) {
+            for (x, w) in rule.points.iter().zip(&rule.weights) {
                 let power = x.powi(LOG_POWER - 1);
                 let place = (u + side * first * power * x).clamp(0.0, 1.0);
                 let weight = w * first * f64::from(LOG_POWER) * power;

@@ -157,12 +157,13 @@ impl Rectangles for AxialPieces<'_> {
         let rule = |points: usize| solution.rules().rule(points.clamp(1, super::assembly::LARGEST_ORDER));
         // The charge is ρ times a polynomial of degree order - 1; round the axis it is constant.
         let (along, across) = (rule((degree[0] + of.order + 1).div_ceil(2)), rule((degree[1] + 2) / 2));
-        let turns: Vec<(f64, f64)> = across.nodes.iter().map(|v| (low[1] + v * (high[1] - low[1])).sin_cos()).collect();
+        let turns: Vec<(f64, f64)> =
+            across.points.iter().map(|v| (low[1] + v * (high[1] - low[1])).sin_cos()).collect();
         let (n, functions) = (solution.unknowns(), solution.functions());
         let share = (high[0] - low[0]) * (high[1] - low[1]) / TAU;
         let (mut values, mut charges) = (vec![0.0; of.order], vec![0.0; functions]);
         let mut row = vec![0.0; functions];
-        for (x, wx) in along.nodes.iter().zip(&along.weights) {
+        for (x, wx) in along.points.iter().zip(&along.weights) {
             let u = low[0] + x * (high[0] - low[0]);
             let place = of.at(&solution.bodies, u).0;
             legendre(u, &mut values);

@@ -126,7 +126,7 @@ impl AxialSolution {
     /// Nodes (ρ, z), m, in the order of the charges.
     pub fn nodes(&self) -> Vec<[f64; 2]> {
         let places = |e: &Element| -> Vec<[f64; 2]> {
-            self.rules.rule(e.order).nodes.iter().map(|&u| e.at(&self.bodies, u).0).collect()
+            self.rules.rule(e.order).points.iter().map(|&u| e.at(&self.bodies, u).0).collect()
         };
         self.data.elements.iter().flat_map(places).collect()
     }
@@ -144,7 +144,7 @@ impl AxialSolution {
 
     fn coefficients_of(&self, element: &Element, charges: &[f64]) -> Vec<f64> {
         let n = element.order;
-        let (nodes, transform) = (&self.rules.rule(n).nodes, self.rules.transform(n));
+        let (nodes, transform) = (&self.rules.rule(n).points, self.rules.transform(n));
         let values: Vec<f64> = nodes.iter().zip(charges).map(|(&u, q)| q / element.at(&self.bodies, u).0[0]).collect();
         (0..n).map(|k| (0..n).map(|j| transform[k * n + j] * values[j]).sum()).collect()
     }

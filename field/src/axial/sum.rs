@@ -140,7 +140,7 @@ impl AxialSum {
             let n = fine_nodes(element.order);
             let rule = self.rules.rule(n);
             let begin = places.len() / GROUP;
-            places.extend(rule.nodes.iter().zip(&rule.weights).map(|(u, w)| (e, *u, *w)));
+            places.extend(rule.points.iter().zip(&rule.weights).map(|(u, w)| (e, *u, *w)));
             self.finer_groups.push(begin..places.len() / GROUP);
             let length = self.nodes[e].length;
             self.reach.push(self.nearest(e, element.order) * length);
@@ -282,7 +282,7 @@ impl AxialSum {
             let rule = self.rules.rule(fine_nodes(element.order));
             for cell in cells.iter() {
                 let width = cell.to - cell.from;
-                fine.extend(rule.nodes.iter().zip(&rule.weights).map(|(x, w)| (e, cell.from + width * x, w * width)));
+                fine.extend(rule.points.iter().zip(&rule.weights).map(|(x, w)| (e, cell.from + width * x, w * width)));
             }
         }
         let groups = |rings: &Rings| 0..rings.radius.len() / GROUP;

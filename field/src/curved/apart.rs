@@ -32,18 +32,27 @@ struct Others<'a> {
     patches: &'a [Patch],
     electrode: &'a [u32],
     balls: Vec<Ball>,
+    /// Patches by the height of their middles along x.
+    sorted: Vec<u32>,
+    /// Largest reach of all.
+    widest: f64,
     sources: &'a [Source],
     ground: Option<Plane>,
 }
 
 impl Others<'_> {
-    /// Patches of other electrodes that may come within a distance of a ball.
-    fn candidates(&self, of: u32, ball: &Ball, within: f64, among: &[u32]) -> Vec<u32> {
+    /// Patches of other electrodes that may come within a distance of a ball; of all, or of those known to be near.
+    fn candidates(&self, of: u32, ball: &Ball, within: f64, among: Option<&[u32]>) -> Vec<u32> {
         let near = |&&p: &&u32| {
             let other = &self.balls[p as usize];
             let apart = (other.center - ball.center).norm() - BULGE * (other.reach + ball.reach);
             self.electrode[p as usize] != of && apart < within
         };
+        let among = among.unwrap_or_else(|| {
+            let most = within + BULGE * (self.widest + ball.reach);
+            let up_to = |x: f64| self.sorted.partition_point(|&p| self.balls[p as usize].center.x < x);
+            &self.sorted[up_to(ball.center.x - most)..up_to(ball.center.x + most)]
+        });
         among.iter().filter(near).copied().collect()
     }
 
@@ -72,7 +81,7 @@ impl Others<'_> {
     }
 
     /// Whether to divide an element along each direction, and which patches it may be near to.
-    fn divide(&self, element: &Element, among: &[u32]) -> ([bool; 2], Vec<u32>) {
+    fn divide(&self, element: &Element, among: Option<&[u32]>) -> ([bool; 2], Vec<u32>) {
         let patch = &self.patches[element.patch as usize];
         let ball = Ball::new(patch, element.low, element.high);
         let longest = ball.sides[0].max(ball.sides[1]);
@@ -108,16 +117,18 @@ fn has_place(source: &Source) -> bool {
 /// Divides elements until the distance of other electrodes, of point and ring sources and of a grounded plane changes little
 /// over each, where they are near.
 pub fn apart(mesh: &CurvedMesh, sources: &[Source], ground: Option<Plane>) -> Vec<Element> {
-    let balls = mesh.patches.iter().map(|p| Ball::new(p, [0.0; 2], [1.0; 2])).collect();
-    let others = Others { patches: &mesh.patches, electrode: &mesh.electrode, balls, sources, ground };
+    let balls: Vec<Ball> = mesh.patches.par_iter().map(|p| Ball::new(p, [0.0; 2], [1.0; 2])).collect();
+    let mut sorted: Vec<u32> = (0..mesh.patches.len() as u32).collect();
+    sorted.sort_by(|&a, &b| balls[a as usize].center.x.total_cmp(&balls[b as usize].center.x));
+    let widest = balls.iter().map(|ball| ball.reach).fold(0.0, f64::max);
+    let others = Others { patches: &mesh.patches, electrode: &mesh.electrode, balls, sorted, widest, sources, ground };
     let most = (MOST[0] * mesh.patches.len()).max(MOST[1] / 10).min(MOST[1].max(2 * mesh.elements.len()));
-    let everything: Vec<u32> = (0..mesh.patches.len() as u32).collect();
     let mut done = Vec::new();
-    let mut pending: Vec<(Element, Vec<u32>)> = mesh.elements.iter().map(|e| (*e, everything.clone())).collect();
+    let mut pending: Vec<(Element, Option<Vec<u32>>)> = mesh.elements.iter().map(|e| (*e, None)).collect();
     while !pending.is_empty() {
         let enough = done.len() + pending.len() >= most;
         let judged: Vec<([bool; 2], Vec<u32>)> =
-            pending.par_iter().map(|(element, among)| others.divide(element, among)).collect();
+            pending.par_iter().map(|(element, among)| others.divide(element, among.as_deref())).collect();
         let mut next = Vec::new();
         for ((element, _), (along, near)) in pending.into_iter().zip(judged) {
             let mut parts = vec![element];
@@ -127,7 +138,7 @@ pub fn apart(mesh: &CurvedMesh, sources: &[Source], ground: Option<Plane>) -> Ve
             if parts.len() == 1 {
                 done.push(element);
             } else {
-                next.extend(parts.into_iter().map(|part| (part, near.clone())));
+                next.extend(parts.into_iter().map(|part| (part, Some(near.clone()))));
             }
         }
         pending = next;

@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::element::CurvedMesh;
 use super::kernel::{Moments, Precision, Whole, near_moments, own_moments};
-use super::legendre::{MAX_ORDER, Transform, gauss};
+use super::legendre::{MAX_ORDER, Transform};
+use crate::gauss::gauss;
 use crate::plane::Plane;
 use crate::symmetry::Symmetry;
 

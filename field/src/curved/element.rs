@@ -3,7 +3,7 @@
 use meshes::{Patch, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::legendre::gauss;
+use crate::gauss::gauss;
 
 /// A rectangle in the parameters of a patch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -15,8 +15,9 @@ use std::ops::Range;
 
 use super::assembly::Assembly;
 use super::element::CurvedMesh;
-use super::legendre::{Transform, gauss, legendre};
+use super::legendre::{Transform, legendre};
 use crate::boundary_problem::SolveError;
+use crate::gauss::gauss;
 use crate::multipole::clusters::Clusters;
 use crate::multipole::precondition::{Block, Patches};
 use crate::multipole::{IterativeError, Points, krylov};
@@ -81,10 +82,10 @@ pub struct Solved {
     pub iterations: usize,
 }
 
-/// From how many times its reach on an element counts by its own points: as [`super::kernel::Precision`], but an element has
-/// no more than a twentieth of the potential there.
+/// From how many times its reach on an element counts by its own points: as [`super::kernel::Precision`], but elements
+/// at that distance have a small share of the potential. The residual against exact rows stays that of the iteration.
 fn far(order: usize, accuracy: f64) -> f64 {
-    let rho = accuracy.clamp(1e-12, 1.0).powf(-1.0 / (order + 2) as f64);
+    let rho = (4.0 * accuracy).clamp(1e-12, 1.0).powf(-1.0 / (order + 2) as f64);
     (0.5 * (rho + 1.0 / rho)).max(1.5)
 }
 

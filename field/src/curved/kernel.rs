@@ -3,7 +3,8 @@
 use meshes::{Patch, Vec3};
 
 use super::element::{Ball, Element};
-use super::legendre::{MAX_ORDER, gauss, legendre};
+use super::legendre::{MAX_ORDER, legendre};
+use crate::gauss::gauss;
 
 /// Integrals against products of Legendre polynomials.
 pub type Moments = [[f64; MAX_ORDER]; MAX_ORDER];

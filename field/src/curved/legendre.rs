@@ -1,41 +1,9 @@
-//! Gauss points, and Legendre polynomials as the basis of a charge.
+//! Legendre polynomials as the basis of a charge.
 
-use std::num::NonZeroUsize;
-use std::sync::OnceLock;
-
-use gauss_quad::GaussLegendre;
+use crate::gauss::gauss;
 
 /// Highest order of a charge: polynomials of degree `MAX_ORDER - 1`.
 pub const MAX_ORDER: usize = 8;
-
-/// Gauss-Legendre points and weights on [0, 1].
-#[derive(Clone, Debug)]
-pub struct Gauss {
-    /// Ascending.
-    pub points: Vec<f64>,
-    /// Their sum is 1.
-    pub weights: Vec<f64>,
-}
-
-/// Most points of a rule.
-const MOST: usize = 32;
-
-/// The rule of `n` points, exact for degree 2n - 1; up to 32 points.
-///
-/// # Panics
-/// No points, or more than 32.
-pub fn gauss(n: usize) -> &'static Gauss {
-    static RULES: [OnceLock<Gauss>; MOST + 1] = [const { OnceLock::new() }; MOST + 1];
-    RULES[n].get_or_init(|| {
-        let Some(count) = NonZeroUsize::new(n) else { return Gauss { points: Vec::new(), weights: Vec::new() } };
-        let rule = GaussLegendre::new(count);
-        let mut pairs: Vec<(f64, f64)> = rule.nodes().copied().zip(rule.weights().copied()).collect();
-        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // From [-1, 1].
-        let points = pairs.iter().map(|(x, _)| 0.5 * (1.0 + x)).collect();
-        Gauss { points, weights: pairs.iter().map(|(_, w)| 0.5 * w).collect() }
-    })
-}
 
 /// P_0 to P_(MAX_ORDER - 1) at 2x - 1.
 #[inline(always)]
@@ -120,17 +88,6 @@ impl Transform {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn gauss_rules_integrate_powers() {
-        for n in 1..=32 {
-            let rule = gauss(n);
-            for degree in 0..2 * n {
-                let sum: f64 = rule.points.iter().zip(&rule.weights).map(|(x, w)| w * x.powi(degree as i32)).sum();
-                assert!((sum * (degree + 1) as f64 - 1.0).abs() < 1e-13, "{n} points, degree {degree}");
-            }
-        }
-    }
 
     #[test]
     fn coefficients_give_the_values_back() {

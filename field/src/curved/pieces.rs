@@ -5,7 +5,8 @@ use meshes::Vec3;
 use super::charge::CurvedCharge;
 use super::element::Ball;
 use super::kernel::Moments;
-use super::legendre::{MAX_ORDER, Transform, gauss, legendre};
+use super::legendre::{MAX_ORDER, Transform, legendre};
+use crate::gauss::gauss;
 use crate::pieces::{Piece, Rectangles};
 
 /// Curved elements with the coefficients of their charges.

@@ -87,11 +87,26 @@ pub fn solve_to(
             return Err(SolveError::TooMany { unknowns, most: limit });
         }
     }
+    // Where nothing better can be had: one order less errs more.
+    let judged_by_rougher = |solution: CurvedSolution| {
+        let mesh = &solution.charge.mesh;
+        let rough = CurvedMesh { order: (mesh.order - 1).max(1), ..(**mesh).clone() };
+        begins(&rough);
+        let errors = difference(&solution, &problem.solve(&rough, 0.01 * accuracy, progress)?);
+        Ok(Refined { solution, errors, judged_by: 0 })
+    };
     let mut before: Option<CurvedSolution> = None;
     for round in 1.. {
         // Integrals to a hundredth of what is asked.
         begins(&mesh);
-        let solution = problem.solve(&mesh, 0.01 * accuracy, progress)?;
+        let solution = match (problem.solve(&mesh, 0.01 * accuracy, progress), before.take()) {
+            // The coarser one will have to do.
+            (Err(SolveError::TooLarge { .. }), Some(coarse)) => return judged_by_rougher(coarse),
+            (solution, coarse) => {
+                before = coarse;
+                solution?
+            }
+        };
         let mut known = None;
         if let Some(coarse) = before {
             let errors = difference(&solution, &coarse).times(TRUST);
@@ -115,12 +130,7 @@ pub fn solve_to(
             }
             finer = CurvedMesh { order: level.order, ..mesh.clone() };
             if reduced(finer.unknowns(), reduction) > limit {
-                // No judge either: one order less errs more.
-                let rough = CurvedMesh { order: (mesh.order - 1).max(1), ..mesh };
-                begins(&rough);
-                let rough = problem.solve(&rough, 0.01 * accuracy, progress)?;
-                let errors = difference(&solution, &rough);
-                return Ok(Refined { solution, errors, judged_by: 0 });
+                return judged_by_rougher(solution);
             }
         }
         mesh = finer;

@@ -8,7 +8,8 @@ use pulp::Arch;
 use super::charge::CurvedCharge;
 use super::element::CurvedMesh;
 use super::kernel::{Moments, Precision, Whole, near_field};
-use super::legendre::{Transform, gauss};
+use super::legendre::Transform;
+use crate::gauss::gauss;
 
 /// Points that are summed side by side.
 const LANES: usize = 8;

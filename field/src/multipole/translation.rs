@@ -21,10 +21,10 @@ use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par, Side};
-use gauss_rule::legendre;
 use meshes::Vec3;
 
 use super::solid::{Family, complex, parts, place, values};
+use crate::gauss::gauss;
 
 /// Directions with no negative component: components 0 to 3, one of them at least 2.
 const DIRECTIONS: usize = 64;
@@ -325,7 +325,9 @@ fn to_parent(degree: usize, t: &Vec3) -> Mat<f64> {
 fn gram_roots(degree: usize, norm: &[f64], classes: &[usize]) -> (Mat<f64>, Mat<f64>) {
     let n = parts(degree);
     // Products are of degree 2p along each axis, and the rule is symmetric: an eighth of the cube gives what is even.
-    let rule: Vec<(f64, f64)> = legendre(degree + 1).into_iter().filter(|(x, _)| *x > -1e-12).collect();
+    let rule = gauss(degree + 1);
+    let both = rule.points.iter().zip(&rule.weights).map(|(u, w)| (2.0 * u - 1.0, *w));
+    let rule: Vec<(f64, f64)> = both.filter(|(x, _)| *x > -1e-12).collect();
     let mut functions = Mat::<f64>::zeros(n, rule.len().pow(3));
     let mut column = 0;
     let half = |x: f64, w: f64| if x.abs() < 1e-12 { 0.5 * w } else { w };
@@ -397,36 +399,6 @@ fn leading(total: &Mat<f64>, classes: &[usize], cut: f64) -> (Mat<f64>, Vec<usiz
     }
     found.truncate(rank);
     (Mat::from_fn(n, rank, |a, r| found[r].2[a]), found.into_iter().map(|f| f.1).collect())
-}
-
-mod gauss_rule {
-    /// Nodes and weights of the Gauss-Legendre rule on [-1, 1], the weights summing to one, by Newton's method on the
-    /// recurrence of Legendre polynomials.
-    pub(super) fn legendre(count: usize) -> Vec<(f64, f64)> {
-        let mut rule: Vec<(f64, f64)> = (0..count)
-            .map(|k| {
-                let mut x = -(std::f64::consts::PI * (k as f64 + 0.75) / (count as f64 + 0.5)).cos();
-                let mut slope = 1.0;
-                for _ in 0..100 {
-                    let (mut before, mut here) = (1.0, x);
-                    for l in 2..=count {
-                        (before, here) = (here, ((2 * l - 1) as f64 * x * here - (l - 1) as f64 * before) / l as f64);
-                    }
-                    slope = count as f64 * (x * here - before) / (x * x - 1.0);
-                    let step = here / slope;
-                    x -= step;
-                    if step.abs() < 1e-15 {
-                        break;
-                    }
-                }
-                (x, 1.0 / ((1.0 - x * x) * slope * slope))
-            })
-            .collect();
-        if count == 1 {
-            rule = vec![(0.0, 1.0)];
-        }
-        rule
-    }
 }
 
 #[cfg(test)]
