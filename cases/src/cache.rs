@@ -57,7 +57,8 @@ impl Kind {
     }
 }
 
-fn digest(parts: &[&[u8]]) -> Digest {
+/// The digest of some bytes in parts.
+pub(crate) fn digest(parts: &[&[u8]]) -> Digest {
     let mut hasher = blake3::Hasher::new();
     for part in parts {
         hasher.update(&(part.len() as u64).to_le_bytes());

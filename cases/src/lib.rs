@@ -34,6 +34,7 @@
 pub mod cache;
 pub mod case;
 mod case_source;
+pub mod checkpoint;
 pub mod cli;
 mod error;
 mod explain;

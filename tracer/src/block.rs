@@ -1,6 +1,7 @@
 //! Grains side by side: where they are and the step they try.
 
 use meshes::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::force::{Batch, Scratch};
 use crate::linear::Linear;
@@ -26,7 +27,7 @@ pub(crate) struct Block<'a> {
 }
 
 /// Where a grain is.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct State {
     /// s.
     pub time: f64,

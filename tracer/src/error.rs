@@ -36,6 +36,17 @@ pub enum TraceError {
         /// What is wrong.
         source: DragError,
     },
+    /// What was to be resumed is of other grains.
+    #[error("grain {grain} of the flights to resume is not among the {grains} of the ensemble")]
+    Resume {
+        /// Index in an ensemble.
+        grain: usize,
+        /// How many there are.
+        grains: usize,
+    },
+    /// Where the flights stand cannot be kept.
+    #[error("{0}")]
+    Journal(String),
     /// The tolerance asks for a step so small that time no longer advances.
     #[error(
         "grain {grain} at {} {} {} m, time {time} s: tolerance {tolerance} asks for a step below {step} s; \

@@ -68,7 +68,7 @@ pub(crate) fn estimate(
         Tightened::Tolerance => tighter.tolerance = (options.tolerance / TIGHTER).max(1e-14),
         Tightened::Step => tighter.step = options.step.map(|step| 0.5 * step),
     }
-    (tighter.every, tighter.progress) = (None, None);
+    (tighter.every, tighter.progress, tighter.journal, tighter.resume) = (None, None, None, None);
     let again = match run(system, &ensemble.subset(&grains), &tighter, &Nothing) {
         Ok(again) => again,
         // The tighter tolerance may be out of reach where the wanted one was not.

@@ -81,6 +81,7 @@
 //! strike, to the accuracy of the steps themselves. [`Method`] lists the others. Surfaces cost nothing while a grain is far
 //! from them, and no step is too long for a wire to be met.
 
+pub mod checkpoint;
 pub mod cloud;
 pub mod constants;
 pub mod drag;
@@ -104,6 +105,7 @@ mod linear;
 mod path;
 mod progress;
 
+pub use checkpoint::{Frame, Journal, Standing};
 pub use cloud::{CloudError, Group, Launch, Place, grain_id};
 pub use drag::{Drag, DragError, DragLaw};
 pub use error::TraceError;

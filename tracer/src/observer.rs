@@ -3,11 +3,12 @@
 use std::sync::Mutex;
 
 use meshes::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::Ending;
 
 /// A grain at a time.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
     /// s.
     pub time: f64,

@@ -4,7 +4,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::TraceError;
+use crate::{Journal, Standing, TraceError};
 
 /// Which integrator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -56,6 +56,10 @@ pub struct Options {
     pub block: usize,
     /// Trace a few grains again, tighter, to tell the error. Default: yes.
     pub estimate_error: bool,
+    /// Keeps where the flights stand. Default: nobody.
+    pub journal: Option<Arc<dyn Journal>>,
+    /// Where an earlier run of the same flights stood. Default: at the start.
+    pub resume: Option<Arc<Standing>>,
     /// Told how far the run is. Default: nobody.
     pub progress: Option<Progress>,
     /// Once true, the run ends cleanly after the current step. Default: never.
@@ -75,6 +79,8 @@ impl Default for Options {
             seed: 1,
             block: 64,
             estimate_error: true,
+            journal: None,
+            resume: None,
             progress: None,
             cancel: None,
         }

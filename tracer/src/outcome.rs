@@ -1,9 +1,10 @@
 //! How flights end.
 
 use meshes::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// How a flight ended.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Outcome {
     /// It lasted for the whole time.
     TimeUp,
@@ -35,7 +36,7 @@ pub enum Outcome {
 }
 
 /// An outcome and its time.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ending {
     /// How.
     pub outcome: Outcome,

@@ -1,6 +1,7 @@
 //! The way of one grain during one step.
 
 use meshes::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// Position and velocity during a step, as polynomials of the seventh degree.
 ///
@@ -18,7 +19,7 @@ pub struct Path {
 }
 
 /// Where a grain is, how fast, how accelerated.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
     /// m.
     pub position: Vec3,

@@ -4,13 +4,14 @@ use meshes::Vec3;
 use rayon::prelude::*;
 
 use crate::block::Block;
+use crate::checkpoint::Landed;
 use crate::flight::{BlockResult, LEAST_TRAVEL, Loop, Run};
 use crate::integrator::boris::Boris;
 use crate::integrator::dop853::Dop853;
 use crate::integrator::langevin::Langevin;
 use crate::integrator::splitting::{BLANES_MOAN_4, BLANES_MOAN_6, Splitting, VERLET};
 use crate::progress::Meter;
-use crate::{Ending, Ensemble, ErrorEstimate, Method, Observer, Options, System, TraceError};
+use crate::{Ending, Ensemble, ErrorEstimate, Method, Observer, Options, Standing, System, TraceError};
 
 /// What came of a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,6 +97,9 @@ fn resolve(system: &System, options: &Options) -> Result<Method, TraceError> {
     Ok(method)
 }
 
+/// Where a run stands that was never begun.
+static NOWHERE: Standing = Standing::new();
+
 /// One pass over all grains.
 pub(crate) fn run(
     system: &System,
@@ -118,12 +122,19 @@ pub(crate) fn run(
         least_travel: LEAST_TRAVEL * region,
         shared,
     };
-    let all: Vec<usize> = (0..ensemble.len()).collect();
+    let standing = options.resume.as_deref().unwrap_or(&NOWHERE);
+    if let Some(grain) = standing.stranger(ensemble.len()) {
+        return Err(TraceError::Resume { grain, grains: ensemble.len() });
+    }
+    standing.tell(observer);
+    let flown = standing.flying.values().map(|flying| flying.state.time - options.start).sum::<f64>();
+    run.meter.add(standing.landed.len() as f64 * options.duration + flown);
+    let all: Vec<usize> = (0..ensemble.len()).filter(|grain| !standing.landed.contains_key(grain)).collect();
     let results: Vec<Result<BlockResult, TraceError>> = if shared {
         vec![fly(&run, &all)]
     } else {
         // Blocks small enough that all threads have some.
-        let share = ensemble.len().div_ceil(2 * rayon::current_num_threads()).max(1);
+        let share = all.len().div_ceil(2 * rayon::current_num_threads()).max(1);
         all.par_chunks(options.block.min(share)).map(|grains| fly(&run, grains)).collect()
     };
     let mut traced = Traced {
@@ -136,16 +147,19 @@ pub(crate) fn run(
         force_evaluations: 0,
         error: None,
     };
+    let mut counts = standing.counts;
+    let mut land = |landed: &Landed| {
+        traced.ensemble.place(landed.grain, landed.position, landed.velocity);
+        traced.endings[landed.grain] = landed.ending;
+    };
+    standing.landed.values().for_each(&mut land);
     for result in results {
         let result = result?;
-        traced.accepted += result.accepted;
-        traced.rejected += result.rejected;
-        traced.force_evaluations += result.evaluations;
-        for flown in result.flown {
-            traced.ensemble.place(flown.grain, flown.position, flown.velocity);
-            traced.endings[flown.grain] = flown.ending;
-        }
+        counts.add(result.counts);
+        result.landed.iter().for_each(&mut land);
     }
+    (traced.accepted, traced.rejected, traced.force_evaluations) =
+        (counts.accepted, counts.rejected, counts.evaluations);
     Ok(traced)
 }
 

@@ -145,6 +145,9 @@ pub struct Output {
     pub every: Option<f64>,
     /// About how many nodes the written field has; `None`: to be chosen.
     pub field_nodes: Option<usize>,
+    /// Time on the clock between checkpoints, s; `None`: to be chosen. No result depends on it.
+    #[serde(skip)]
+    pub checkpoint: Option<f64>,
 }
 
 /// A study: the case once for each combination of values.

@@ -16,7 +16,7 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(super) enum Verb {
     /// Mesh, solve, tabulate, trace, and write everything
-    Run(Common),
+    Run(RunArguments),
     /// Read a case, stand its electrodes and grains in place, and say whether it can run
     Check(Common),
     /// Write the meshed electrodes, and report on the quality of the mesh
@@ -28,7 +28,7 @@ pub(super) enum Verb {
     /// Tabulate the potential and measure the table's error
     Table(Common),
     /// Like run, for a case that must have grains to trace
-    Trace(Common),
+    Trace(RunArguments),
     /// Print the JSON Schema of the case file, for editors
     Schema,
     /// Print a script that completes arguments in a shell
@@ -41,12 +41,8 @@ pub(super) enum Verb {
 impl Verb {
     pub fn common(&self) -> Option<&Common> {
         match self {
-            Self::Run(common)
-            | Self::Check(common)
-            | Self::Mesh(common)
-            | Self::Solve(common)
-            | Self::Table(common)
-            | Self::Trace(common) => Some(common),
+            Self::Check(common) | Self::Mesh(common) | Self::Solve(common) | Self::Table(common) => Some(common),
+            Self::Run(arguments) | Self::Trace(arguments) => Some(&arguments.common),
             Self::Probe(arguments) => Some(&arguments.common),
             Self::Schema | Self::Completions { .. } => None,
         }
@@ -78,6 +74,15 @@ pub(super) struct Common {
     /// Print one JSON object on standard output, words on standard error
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(super) struct RunArguments {
+    #[command(flatten)]
+    pub common: Common,
+    /// Go on where a run that was stopped or killed left the grains, to the same results
+    #[arg(long)]
+    pub resume: bool,
 }
 
 #[derive(Args, Clone, Debug)]

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::checkpoint::CHECKPOINT;
 use crate::output::folder::{remove_all_partial, undisturbed};
 use crate::pipeline::Failure;
 
@@ -11,7 +12,12 @@ pub(super) fn clean_up_in(folder: PathBuf) -> Result<(), Failure> {
     let handler = move || {
         let committed = undisturbed();
         remove_all_partial(&folder);
-        eprintln!("\nstopped: {}", if *committed { "all files were written" } else { "no file was written" });
+        let left = match (*committed, folder.join(CHECKPOINT).is_file()) {
+            (true, _) => "all files were written",
+            (false, true) => "no results were written; --resume goes on from the checkpoint",
+            (false, false) => "no file was written",
+        };
+        eprintln!("\nstopped: {left}");
         std::process::exit(1);
     };
     ctrlc::set_handler(handler)

@@ -36,8 +36,8 @@ pub fn main() -> ExitCode {
 
 fn dispatch(verb: &Verb) -> Result<(), Failure> {
     match verb {
-        Verb::Run(common) => run::run(&open(common)?, false),
-        Verb::Trace(common) => run::run(&open(common)?, true),
+        Verb::Run(arguments) => run::run(&open(&arguments.common)?, arguments.resume, false),
+        Verb::Trace(arguments) => run::run(&open(&arguments.common)?, arguments.resume, true),
         Verb::Check(common) => check::check(&open(common)?),
         Verb::Mesh(common) => mesh::mesh(&open(common)?),
         Verb::Solve(common) => fields::fields(&open(common)?, Extent::Solution),

@@ -1,23 +1,25 @@
 //! `graintrap run` and `graintrap trace`: the whole chain.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::fields;
 use super::session::Session;
+use crate::checkpoint::{self, CHECKPOINT, Checkpoint, Left};
 use crate::output::summary::TraceSummary;
 use crate::output::{pictures, tracks};
-use crate::pipeline::flights::{fly, obstacles};
+use crate::pipeline::flights::{Kept, fly, obstacles};
 use crate::pipeline::ready::{flight_region, ready};
 use crate::pipeline::{Failure, Reporter};
 
-/// Mesh, solve, tabulate, trace, write; `trace`: there must be grains.
-pub(super) fn run(session: &Session, trace: bool) -> Result<(), Failure> {
+/// Mesh, solve, tabulate, trace, write. `resume`: from where an earlier run left the grains; `trace`: there must be grains.
+pub(super) fn run(session: &Session, resume: bool, trace: bool) -> Result<(), Failure> {
     let (case, source) = (&session.case, &session.source);
     if trace && case.grains.is_empty() {
         let help = "add [[grains]] and [trace] to it, or use `graintrap table` to look at its field";
         return Err(source.error_at("grains", "the case has no grains to trace", help).into());
     }
+    let left = left(session, resume)?;
     let mut out = session.output()?;
     let ready = ready(case, source, &*session.progress)?;
     let mut summary = session.summary(if trace { "trace" } else { "run" });
@@ -34,7 +36,10 @@ pub(super) fn run(session: &Session, trace: bool) -> Result<(), Failure> {
         let region = flight_region(case, mesh);
         let surface = obstacles(mesh, case.field.ground.as_ref(), &region);
         let reporter: Arc<dyn Reporter> = session.progress.clone();
-        let flights = fly(case, settings, source, driven.field, surface, &ready.ensemble, region, &reporter)?;
+        let every = case.output.checkpoint.map(|s| Duration::try_from_secs_f64(s).unwrap_or(Duration::MAX));
+        let journal = Checkpoint::new(&session.folder, case, every, left.as_ref(), out.early("cache"))?;
+        let kept = Kept { journal: Arc::new(journal), standing: left.map(|left| Arc::new(left.standing)) };
+        let flights = fly(case, settings, source, driven.field, surface, &ready.ensemble, region, kept, &reporter)?;
         session.progress.stage("write");
         let start = Instant::now();
         tracks::write(&mut out, &flights, &ready.ensemble)?;
@@ -55,5 +60,27 @@ pub(super) fn run(session: &Session, trace: bool) -> Result<(), Failure> {
         summary.seconds.trace = Some(0.0);
     }
     summary.seconds.write = writing;
-    session.finish(out, summary)
+    session.finish(out, summary)?;
+    Checkpoint::remove(&session.folder);
+    Ok(())
+}
+
+/// What an earlier run left to resume.
+fn left(session: &Session, resume: bool) -> Result<Option<Left>, Failure> {
+    let path = session.folder.join(CHECKPOINT);
+    if !resume {
+        if path.is_file() {
+            session.progress.warning(&format!(
+                "{} is that of a run which did not end; --resume would go on with it, this run begins anew and replaces it",
+                path.display()
+            ));
+        }
+        return Ok(None);
+    }
+    let left = checkpoint::left(&session.folder, &session.case)?;
+    match &left {
+        None => session.progress.warning(&format!("there is no {} to resume: the run begins anew", path.display())),
+        Some(left) => left.remark.iter().for_each(|remark| session.progress.warning(remark)),
+    }
+    Ok(left)
 }

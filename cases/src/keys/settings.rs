@@ -236,4 +236,6 @@ pub(crate) struct OutputKeys {
     pub every: Option<Positive<Time>>,
     /// About how many nodes the written field has; left out: chosen.
     pub field_nodes: Option<Count>,
+    /// Time on the clock after which a long run keeps anew where its grains are, for --resume; left out: 10 s.
+    pub checkpoint: Option<Positive<Time>>,
 }

@@ -96,6 +96,23 @@ impl OutputFolder {
         Ok(())
     }
 
+    /// What gives the files of a folder within this one their own names beforehand, as far as that can be done: they hold no
+    /// results, but what a run that is resumed would have to find again.
+    pub fn early(&self, folder: &str) -> impl Fn() + Send + Sync + 'static {
+        let of_folder = self.written.iter().filter(|name| Path::new(name).starts_with(folder));
+        let pairs: Vec<_> = of_folder.map(|name| (self.temporary(name), self.path.join(name))).collect();
+        move || {
+            let _undisturbed = undisturbed();
+            for (temporary, path) in &pairs {
+                // The second name of the file takes the place of the old one; the first is left for the commit.
+                let second = temporary.with_extension(format!("early{PARTIAL}"));
+                if fs::hard_link(temporary, &second).is_ok() && fs::rename(&second, path).is_err() {
+                    let _ = fs::remove_file(&second);
+                }
+            }
+        }
+    }
+
     /// Gives every file its own name. Files of an earlier run in `grains/` that this one did not write go away.
     ///
     /// # Errors
@@ -178,7 +195,7 @@ fn remove_partial(folder: &Path) {
 }
 
 /// An error of the system without its number.
-fn plain(error: &io::Error) -> String {
+pub(crate) fn plain(error: &io::Error) -> String {
     error.to_string().split(" (os error").next().unwrap_or_default().to_lowercase()
 }
 

@@ -6,8 +6,8 @@ use std::time::Instant;
 use field::{DrivenField, Plane};
 use meshes::{ElectrodeSurface, SurfaceMesh, SurfaceTree, Vec3};
 use tracer::{
-    DragLaw, Ensemble, Gas, GasKind, Group, Method, Options, Region, Sample, System, TraceError, Traced, Trajectories,
-    trace,
+    DragLaw, Ensemble, Gas, GasKind, Group, Journal, Method, Options, Region, Sample, Standing, System, TraceError,
+    Traced, Trajectories, trace,
 };
 
 use super::{Failure, Reporter, memory};
@@ -29,6 +29,14 @@ pub struct Flights {
     pub region: Region,
     /// s.
     pub seconds: f64,
+}
+
+/// Where flights begin that an earlier run left, and where it is kept how they stand.
+pub struct Kept {
+    /// The keeper.
+    pub journal: Arc<dyn Journal>,
+    /// Where the grains stood.
+    pub standing: Option<Arc<Standing>>,
 }
 
 /// Samples of a flight when the case does not say, unless RF asks for more.
@@ -221,6 +229,7 @@ pub fn fly(
     surface: Option<Arc<SurfaceTree>>,
     ensemble: &Ensemble,
     region: Region,
+    kept: Kept,
     reporter: &Arc<dyn Reporter>,
 ) -> Result<Flights, Failure> {
     reporter.stage("trace");
@@ -245,6 +254,8 @@ pub fn fly(
         step: settings.step,
         every: Some(every),
         seed: settings.seed,
+        journal: Some(kept.journal),
+        resume: kept.standing,
         progress: Some(Arc::new(move |done| listener.fraction(done))),
         ..Options::default()
     };
@@ -282,5 +293,7 @@ fn explained(error: TraceError, source: &CaseSource) -> Failure {
         TraceError::Method { advice, .. } => source.error_at("trace.integrator", text, advice).into(),
         TraceError::Drag { .. } => source.error_at("forces.drag", text, "change the drag or the grain's radius").into(),
         TraceError::StepUnderflow { advice, .. } => Failure::run(text, advice),
+        TraceError::Journal(_) => Failure::run(text, "make room on the disk, or write elsewhere with -o DIR"),
+        TraceError::Resume { .. } => Failure::usage(text, "start anew, without --resume"),
     }
 }

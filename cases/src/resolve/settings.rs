@@ -184,5 +184,9 @@ pub(super) fn trace(
 }
 
 pub(super) fn output(keys: &OutputKeys) -> Output {
-    Output { every: keys.every.map(|every| every.value), field_nodes: keys.field_nodes.map(|nodes| nodes.count()) }
+    Output {
+        every: keys.every.map(|every| every.value),
+        field_nodes: keys.field_nodes.map(|nodes| nodes.count()),
+        checkpoint: keys.checkpoint.map(|checkpoint| checkpoint.value),
+    }
 }

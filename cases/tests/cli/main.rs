@@ -11,5 +11,6 @@ mod ground;
 mod harness;
 mod json;
 mod odd;
+mod resume;
 mod same;
 mod stopped;

@@ -1,7 +1,9 @@
 //! What the loop over steps remembers of one grain.
 
 use meshes::Vec3;
+use serde::{Deserialize, Serialize};
 
+use crate::checkpoint::Flying;
 use crate::event::{Crossing, Met};
 use crate::path::Motion;
 use crate::{Ending, Outcome, Sample};
@@ -9,6 +11,8 @@ use crate::{Ending, Outcome, Sample};
 /// What the loop remembers of one grain besides its state.
 pub(crate) struct Lane {
     pub grain: usize,
+    /// Whether its flight began in an earlier run.
+    pub begun: bool,
     /// Next time at which a force is not smooth, s.
     pub corner: f64,
     /// Step that the error control would like, s; zero before the first.
@@ -32,7 +36,7 @@ pub(crate) struct Lane {
 }
 
 /// Even steps between two times at which a step must end.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Grid {
     pub start: f64,
     pub stop: f64,
@@ -56,6 +60,27 @@ pub(crate) enum Kind {
     Met(Crossing),
     Unstable,
     Stopped,
+}
+
+impl Lane {
+    /// As it was when it was kept.
+    pub fn resumed(flying: &Flying) -> Self {
+        Self {
+            grain: flying.grain,
+            begun: true,
+            corner: flying.corner,
+            wanted: flying.wanted,
+            rejected: flying.rejected,
+            grid: flying.grid,
+            number: flying.number,
+            sample: flying.sample,
+            anchor: flying.anchor,
+            clear: flying.clear,
+            buffer: Vec::new(),
+            sampled: flying.sampled,
+            fate: None,
+        }
+    }
 }
 
 impl Grid {

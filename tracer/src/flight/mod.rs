@@ -1,20 +1,24 @@
 //! The loop over steps of one block.
 
 mod lane;
+mod log;
 mod sampling;
 
 use meshes::Vec3;
 
-use self::lane::{Fate, Grid, Kind, Lane};
+pub(crate) use self::lane::Grid;
+use self::lane::{Fate, Kind, Lane};
+use self::log::Log;
 use self::sampling::Point;
 
 use crate::block::{Block, State, retain};
+use crate::checkpoint::{Counts, Landed};
 use crate::event::first_event;
 use crate::integrator::{Integrator, IntegratorNature};
 use crate::linear::Linear;
 use crate::path::Path;
 use crate::progress::Meter;
-use crate::{Ending, Ensemble, Event, Observer, Options, System, TraceError};
+use crate::{Ensemble, Event, Observer, Options, System, TraceError};
 
 /// What all blocks of a run have in common.
 pub(crate) struct Run<'a> {
@@ -34,21 +38,11 @@ pub(crate) struct Run<'a> {
     pub shared: bool,
 }
 
-/// How the flight of one grain went.
-pub(crate) struct Flown {
-    pub grain: usize,
-    pub ending: Ending,
-    pub position: Vec3,
-    pub velocity: Vec3,
-}
-
 /// What came of a block.
 #[derive(Default)]
 pub(crate) struct BlockResult {
-    pub flown: Vec<Flown>,
-    pub accepted: u64,
-    pub rejected: u64,
-    pub evaluations: u64,
+    pub landed: Vec<Landed>,
+    pub counts: Counts,
 }
 
 /// Motions smaller than this part of the region are traced as if they were this large: relative to the region, they err
@@ -73,6 +67,7 @@ pub(crate) struct Loop<'a, 'b, I> {
     paths: Vec<Path>,
     path_lanes: Vec<usize>,
     points: Vec<Point>,
+    log: Log,
 }
 
 impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
@@ -84,8 +79,13 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
         let start = run.options.start;
         let margin = block.forces.margin(start, start);
         let lanes = grains.iter().enumerate().map(|(lane, &grain)| {
+            if let Some(flying) = run.options.resume.as_ref().and_then(|standing| standing.flying.get(&grain)) {
+                block.state[lane] = flying.state;
+                return Lane::resumed(flying);
+            }
             block.state[lane].time = start;
             Lane {
+                begun: false,
                 grain,
                 corner: run.system.next_corner(start + 2.0 * margin),
                 wanted: 0.0,
@@ -111,6 +111,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
             paths: Vec::new(),
             path_lanes: Vec::new(),
             points: Vec::new(),
+            log: Log::new(),
         })
     }
 
@@ -132,16 +133,23 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
             rounds += 1;
             if rounds.is_multiple_of(ROUNDS) || self.lanes.is_empty() {
                 self.run.meter.report();
+                self.keep_if_due()?;
             }
         }
         self.run.meter.report();
-        self.result.evaluations = self.block.forces.evaluations;
+        self.result.counts.evaluations = self.block.forces.evaluations;
+        if !self.run.options.cancelled() {
+            self.keep()?;
+        }
         Ok(self.result)
     }
 
     /// First samples, and the end of grains that must not start where they do.
     fn begin(&mut self) {
         for lane in 0..self.lanes.len() {
+            if self.lanes[lane].begun {
+                continue;
+            }
             let state = self.block.state[lane];
             let (position, velocity) = (state.motion.position, state.motion.velocity);
             let excluded = self.run.events.iter().find_map(|event| event.excludes(&position));
@@ -283,7 +291,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
 
     /// Makes the step of a grain smaller after a failure; `false` when it cannot be.
     fn shorten(&mut self, lane: usize) -> bool {
-        self.result.rejected += 1;
+        self.result.counts.rejected += 1;
         if !self.nature.adaptive {
             return false;
         }
@@ -467,7 +475,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
 
     /// Makes the end of the step the new state.
     fn commit(&mut self, lane: usize) {
-        self.result.accepted += 1;
+        self.result.counts.accepted += 1;
         let (run, trial) = (self.run, self.block.trial[lane]);
         let (state, l) = (&mut self.block.state[lane], &mut self.lanes[lane]);
         run.meter.add(trial.end - state.time);
@@ -517,16 +525,15 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
             self.take_samples();
         }
         let keep: Vec<bool> = self.lanes.iter().map(|lane| lane.fate.is_none()).collect();
-        for (lane, l) in self.lanes.iter().enumerate() {
-            let Some(fate) = l.fate else { continue };
+        for lane in 0..self.lanes.len() {
+            let Some(fate) = self.lanes[lane].fate else { continue };
             let ending = fate.ending(self.block.forces.mass[lane]);
             self.run.meter.add(self.run.options.end() - self.block.state[lane].time);
-            if !l.buffer.is_empty() {
-                self.run.observer.record(l.grain, &l.buffer);
-            }
-            self.run.observer.end(l.grain, &ending);
-            let (position, velocity) = (fate.position, fate.velocity);
-            self.result.flown.push(Flown { grain: l.grain, ending, position, velocity });
+            self.record(lane);
+            let grain = self.lanes[lane].grain;
+            self.run.observer.end(grain, &ending);
+            let landed = Landed { grain, ending, position: fate.position, velocity: fate.velocity };
+            self.result.landed.push(landed);
         }
         self.block.retain(&keep);
         retain(&mut self.lanes, &keep);

@@ -105,8 +105,7 @@ impl<I: Integrator> Loop<'_, '_, I> {
         l.sampled = sample.time;
         l.buffer.push(sample);
         if l.buffer.len() >= BUFFER {
-            self.run.observer.record(l.grain, &l.buffer);
-            l.buffer.clear();
+            self.record(lane);
         }
     }
 }
