@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use faer::Mat;
-use meshes::SurfaceMesh;
+use meshes::{SurfaceMesh, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::axial::AxialCharge;
@@ -14,6 +14,7 @@ use crate::curved::{CurvedCharge, CurvedSolution};
 use crate::panel::Panel;
 use crate::panel_sum::PanelSum;
 use crate::plane::Plane;
+use crate::shown;
 use crate::source::Source;
 
 /// What the charges of a solution are.
@@ -46,7 +47,7 @@ pub struct ElectrodeBasis {
     /// What its charges are.
     pub form: SurfaceCharge,
     /// Charge of each panel (row) in each basis function (column), C per volt or per unit of source strength. Where the form is
-    /// not panels, density at the middle of the panel times its area.
+    /// not panels, what the density makes of the panel, with the right sum on each electrode.
     pub charge: Mat<f64>,
     /// Charges on electrodes for unit voltages.
     pub capacitance: CapacitanceMatrix,
@@ -146,14 +147,17 @@ impl ElectrodeBasis {
         report: SolveReport,
     ) -> Self {
         let panels: Vec<Panel> = (0..mesh.panels()).map(|p| Panel::new(mesh.corners(p))).collect();
-        let middles: Vec<_> = panels.iter().zip(&mesh.electrode).map(|(p, e)| (p.centroid, *e as usize)).collect();
-        let densities = match &form {
+        let densities = |points: &[(Vec3, usize)]| match &form {
             SurfaceCharge::Panels => Vec::new(),
-            SurfaceCharge::Curved(charge) => charge.densities(&middles),
-            SurfaceCharge::Axial(charge) => charge.densities(&middles),
+            SurfaceCharge::Curved(charge) => charge.densities(points),
+            SurfaceCharge::Axial(charge) => charge.densities(points),
         };
-        let functions = mesh.electrodes.len() + sources.len();
-        let charge = Mat::from_fn(panels.len(), functions, |p, k| densities[p * functions + k] * panels[p].area);
+        let electrodes = mesh.electrodes.len();
+        let wanted = |e: usize, k: usize| match k.checked_sub(electrodes) {
+            None => capacitance.matrix[e][k],
+            Some(source) => induced[e][source],
+        };
+        let charge = shown::charges(&mesh, &panels, electrodes + sources.len(), &densities, &wanted);
         Self { mesh, panels, sources, ground, form, charge, capacitance, induced, coarse: None, report }
     }
 

@@ -4,6 +4,7 @@ mod exact;
 mod iterative;
 mod kernel;
 mod symmetry;
+mod shown;
 mod table;
 
 use meshes::{GridPattern, Hole, Outline, Placement, Shape, Vec3, patches};
