@@ -10,7 +10,7 @@ use crate::constants::COULOMB;
 fn charges_shown_add_up() {
     let disc = Shape::Disc { radius: 1.0, hole_radius: 0.0, thickness: 0.0 };
     let setup = Setup::one(disc).and(plate(1.0, 1.0), [0.0, 0.0, 40.0], [0.0, 1.0, 1.0]);
-    let solution = setup.solved(1e-4).solution;
+    let solution = setup.solved(1e-7).solution;
     let parts =
         setup.shapes.iter().enumerate().map(|(k, (shape, placement))| {
             (k.to_string(), triangulate(shape, 1.0).unwrap().placed(placement).unwrap())
