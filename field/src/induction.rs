@@ -38,6 +38,9 @@ pub struct Induction {
     inverse: Vec<f32>,
 }
 
+/// No grain is smaller, m.
+const SMALLEST: f64 = 1e-9;
+
 impl Induction {
     /// Inverts the matrix of the panels, with `floating` for each electrode.
     ///
@@ -86,10 +89,14 @@ impl Induction {
     /// Potential (V) and its gradient (V/m) at each of some charged points, of the charges that all of them together induce.
     /// The same bits with any number of threads.
     ///
+    /// A point charge falls without end into its image in a plane; `radii` (m) say how near the middle of a grain comes: the
+    /// square of the distance from an image is larger by that of both radii, but for a grain far smaller than its height nothing
+    /// is changed by that.
+    ///
     /// # Panics
-    /// Another number of charges (C) than of points.
-    pub fn sample(&self, points: &[Vec3], charges: &[f64]) -> Vec<(f64, Vec3)> {
-        assert_eq!(points.len(), charges.len(), "a charge for each point");
+    /// Another number of charges (C) or of radii than of points.
+    pub fn sample(&self, points: &[Vec3], charges: &[f64], radii: &[f64]) -> Vec<(f64, Vec3)> {
+        assert!(points.len() == charges.len() && points.len() == radii.len(), "a charge and a radius for each point");
         let n = self.panels.len();
         let at: Vec<Vec<(f64, Vec3)>> = points.par_iter().map(|x| (0..n).map(|p| self.unit(p, x)).collect()).collect();
         let seen: Vec<f64> =
@@ -99,17 +106,18 @@ impl Induction {
             .par_chunks_exact(n.max(1))
             .map(|row| -row.iter().zip(&seen).map(|(s, b)| f64::from(*s) * b).sum::<f64>())
             .collect();
-        let of_panels = at.into_par_iter().zip(points).map(|(at, x)| {
+        let of_panels = at.into_par_iter().zip(points).zip(radii).map(|((at, x), radius)| {
             let (mut potential, mut gradient) = (0.0, Vec3::zeros());
             for ((p, g), q) in at.iter().zip(&induced) {
                 potential += q * p;
                 gradient += g * *q;
             }
-            for (y, q) in points.iter().zip(charges) {
-                if let Some(plane) = &self.ground {
+            if let Some(plane) = &self.ground {
+                for ((y, q), other) in points.iter().zip(charges).zip(radii) {
                     let arm = x - plane.image(y);
-                    potential -= q / arm.norm();
-                    gradient += arm * (q / arm.norm().powi(3));
+                    let distance = arm.norm().hypot(radius.max(SMALLEST) + other.max(SMALLEST));
+                    potential -= q / distance;
+                    gradient += arm * (q / distance.powi(3));
                 }
             }
             (COULOMB * potential, COULOMB * gradient)
@@ -157,7 +165,7 @@ mod tests {
                     .into_iter()
                     .map(|d| {
                         let point = Vec3::new(0.3, -0.5, 0.8).normalize() * d;
-                        let (potential, gradient) = induction.sample(&[point], &[q])[0];
+                        let (potential, gradient) = induction.sample(&[point], &[q], &[0.0])[0];
                         let free = f64::from(u8::from(floating));
                         let exact = COULOMB * q * (-1.0 / (d * d - 1.0) + free / (d * d));
                         let force = COULOMB * q * (d / (d * d - 1.0).powi(2) - free / d.powi(3));
@@ -182,7 +190,7 @@ mod tests {
         let none = SurfaceMesh::assemble([]);
         let induction = Induction::new(&none, Some(plane), &[]).unwrap();
         let (points, charges) = ([Vec3::new(0.1, 0.0, 0.5), Vec3::new(0.4, 0.2, 0.9)], [2e-12, -1e-12]);
-        let found = induction.sample(&points, &charges);
+        let found = induction.sample(&points, &charges, &[0.0; 2]);
         for (j, (potential, gradient)) in found.iter().enumerate() {
             let (mut p, mut g) = (0.0, Vec3::zeros());
             for (y, q) in points.iter().zip(&charges) {
@@ -202,9 +210,9 @@ mod tests {
             let induction = Induction::new(&sphere(300, 2.0), Some(plane), &[floating]).unwrap();
             let (points, charges) = ([Vec3::new(1.6, 0.2, 1.4), Vec3::new(-0.3, 0.4, 3.5)], [3e-12, -2e-12]);
             let energy = |points: &[Vec3]| -> f64 {
-                induction.sample(points, &charges).iter().zip(&charges).map(|((p, _), q)| 0.5 * p * q).sum()
+                induction.sample(points, &charges, &[0.0; 2]).iter().zip(&charges).map(|((p, _), q)| 0.5 * p * q).sum()
             };
-            let found = induction.sample(&points, &charges);
+            let found = induction.sample(&points, &charges, &[0.0; 2]);
             for j in 0..2 {
                 let force = found[j].1 * -charges[j];
                 for axis in 0..3 {

@@ -113,6 +113,7 @@ pub use estimate::{ErrorEstimate, Tightened};
 pub use event::{Crossing, Event, Met, Region};
 pub use force::coulomb::Coulomb;
 pub use force::electric::Electric;
+pub use force::image_charge::ImageCharge;
 pub use force::uniform::{ConstantForce, Gravity};
 pub use force::{Batch, Force, Nature, Scratch};
 pub use gas::{Gas, GasKind};

@@ -81,6 +81,8 @@ pub struct Forces {
     pub constant: Vec3,
     /// Grains repel each other.
     pub coulomb: bool,
+    /// Grains feel the charges that they all induce on the electrodes.
+    pub image_charge: bool,
     /// T.
     pub magnetic_field: Vec3,
     /// Temperature of the random kicks of the gas, K; then there is a drag.

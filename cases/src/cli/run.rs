@@ -8,7 +8,7 @@ use super::session::Session;
 use crate::checkpoint::{self, CHECKPOINT, Checkpoint, Left};
 use crate::output::summary::TraceSummary;
 use crate::output::{pictures, tracks};
-use crate::pipeline::flights::{Kept, fly, obstacles};
+use crate::pipeline::flights::{Kept, fly, induction, obstacles};
 use crate::pipeline::ready::{flight_region, ready};
 use crate::pipeline::{Failure, Reporter};
 
@@ -39,7 +39,9 @@ pub(super) fn run(session: &Session, resume: bool, trace: bool) -> Result<(), Fa
         let every = case.output.checkpoint.map(|s| Duration::try_from_secs_f64(s).unwrap_or(Duration::MAX));
         let journal = Checkpoint::new(&session.folder, case, every, left.as_ref(), out.early("cache"))?;
         let kept = Kept { journal: Arc::new(journal), standing: left.map(|left| Arc::new(left.standing)) };
-        let flights = fly(case, settings, source, driven.field, surface, &ready.ensemble, region, kept, &reporter)?;
+        let induction = induction(case, source, &ready.electrodes, &*reporter)?;
+        let flights =
+            fly(case, settings, source, driven.field, induction, surface, &ready.ensemble, region, kept, &reporter)?;
         session.progress.stage("write");
         let start = Instant::now();
         tracks::write(&mut out, &flights, &ready.ensemble)?;

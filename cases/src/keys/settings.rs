@@ -96,6 +96,8 @@ pub(crate) struct ForceKeys {
     pub constant: Option<Vector<Force>>,
     /// Whether grains repel each other; left out: they do not.
     pub coulomb: Option<bool>,
+    /// Whether grains feel the charges that they all induce on the electrodes; left out: they do not.
+    pub image_charge: Option<bool>,
     /// Magnetic field; left out: none.
     pub magnetic_field: Option<Vector<MagneticField>>,
     /// Temperature of the random kicks of the gas (needs `drag`); left out: no kicks.

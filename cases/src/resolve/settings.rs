@@ -100,6 +100,7 @@ pub(super) fn forces(at: &At, keys: &ForceKeys, grains: &[GrainGroup]) -> Result
         constant: vector(keys.constant.as_ref().map(Vector::si)),
         // No force acts unless the case names it, this one included: it also costs the square of the number of grains.
         coulomb: keys.coulomb.unwrap_or(false),
+        image_charge: keys.image_charge.unwrap_or(false),
         magnetic_field: vector(keys.magnetic_field.as_ref().map(Vector::si)),
         langevin: keys.langevin.map(|temperature| temperature.value),
     };

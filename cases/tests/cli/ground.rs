@@ -109,3 +109,43 @@ field_nodes = 500
     let run = graintrap(&["run", &case, "--json", "-o", &out]).done().json();
     assert_eq!(run["trace"]["outcomes"]["struck"], serde_json::json!({ "ground": 1 }), "{}", run["trace"]);
 }
+
+/// A grain falls onto the ground, drawn by nothing but its image: Kepler's radial fall, π/2 sqrt(2 m h³ / (k Q²)) long.
+#[test]
+fn cli_a_grain_falls_towards_its_image() {
+    let scratch = Scratch::new();
+    let case = scratch.file(
+        "case.toml",
+        r#"
+[[source]]
+name   = "nothing"
+kind   = "point"
+charge = "0 C"
+center = ["1 m", 0, "1 m"]
+
+[field]
+ground = {}
+
+[[grains]]
+mass   = "1e-9 kg"
+charge = "1e-12 C"
+radius = "1 um"
+place  = { kind = "points", points = [[0, 0, "1 cm"]] }
+
+[forces]
+image_charge = true
+
+[trace]
+duration = "3 s"
+
+[output]
+field_nodes = 500
+"#,
+    );
+    let out = scratch.at("out");
+    let run = graintrap(&["run", &case, "--json", "-o", &out]).done().json();
+    let end = &run["trace"]["final"][0];
+    assert_eq!((end["outcome"].as_str(), end["electrode"].as_str()), (Some("struck"), Some("ground")), "{end}");
+    let exact = 0.5 * std::f64::consts::PI * (2.0 * 1e-9 * 1e-6 * 1.112_650_055_447_87e-10 / 1e-24_f64).sqrt();
+    assert!((number(&end["time"]) / exact - 1.0).abs() < 1e-6, "{end} {exact}");
+}

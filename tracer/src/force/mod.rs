@@ -2,6 +2,7 @@
 
 pub mod coulomb;
 pub mod electric;
+pub mod image_charge;
 pub mod uniform;
 
 use field::Samples;

@@ -3,8 +3,8 @@
 mod exact;
 mod iterative;
 mod kernel;
-mod symmetry;
 mod shown;
+mod symmetry;
 mod table;
 
 use meshes::{GridPattern, Hole, Outline, Placement, Shape, Vec3, patches};
