@@ -78,6 +78,7 @@ mod panel_groups;
 pub mod panel_sum;
 mod pieces;
 mod plane;
+pub mod quadratic;
 mod reduced;
 pub mod source;
 mod symmetry;
@@ -95,6 +96,7 @@ pub use linear_operator::LinearOperator;
 pub use panel::Panel;
 pub use panel_sum::PanelSum;
 pub use plane::Plane;
+pub use quadratic::{Quadratic, QuadraticField};
 pub use source::{Source, SourceKind};
 pub use table::{
     Grid, PotentialTable, TableError, TableOptions, TableReport, TabulatedField, starting_spacing, tabulate,

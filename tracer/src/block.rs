@@ -49,6 +49,8 @@ pub(crate) struct Trial {
     pub step: f64,
     /// s.
     pub end: f64,
+    /// How many steps of length `step` it stands for.
+    pub steps: u64,
     /// Number of the step, for the random numbers.
     pub number: u64,
     /// At the end; the acceleration is that of the forces alone.

@@ -111,6 +111,7 @@ pub use estimate::{ErrorEstimate, Tightened};
 pub use event::{Crossing, Event, Met, Region};
 pub use force::coulomb::Coulomb;
 pub use force::electric::Electric;
+pub use force::linear_form::{LinearChannel, LinearForm};
 pub use force::uniform::{ConstantForce, Gravity};
 pub use force::{Batch, Force, Nature, Scratch};
 pub use gas::{Gas, GasKind};

@@ -24,6 +24,9 @@ pub enum Method {
     BlanesMoan4,
     /// Blanes and Moan's composition of order 6 (eleven forces a step).
     BlanesMoan6,
+    /// Blanes and Moan's composition of order 6 with the smallest error (fourteen forces a step): in a Paul trap 1e-6 after 1000
+    /// periods takes 140 forces a period, where the one with eleven takes 176.
+    BlanesMoan14,
 }
 
 /// Called with the fraction that is done, from 0 to 1, at most about a thousand times, from any thread.

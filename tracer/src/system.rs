@@ -6,6 +6,7 @@ use field::DrivenField;
 use meshes::{SurfaceTree, Vec3};
 
 use crate::constants::BOLTZMANN;
+use crate::force::linear_form::LinearForm;
 use crate::force::{Batch, Force, Nature, Scratch};
 use crate::linear::Linear;
 use crate::{ConstantForce, Coulomb, Drag, DragError, Electric, Event, Gravity, Region};
@@ -114,6 +115,14 @@ impl System {
     /// The first time after `t` (s) at which some force is not smooth, or infinity.
     pub fn next_corner(&self, t: f64) -> f64 {
         self.forces.iter().map(|f| f.next_corner(t)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The sum of the forces as a linear function of position along each axis by itself, if it is one, and no magnetic field
+    /// mixes the axes.
+    pub(crate) fn linear_form(&self) -> Option<LinearForm> {
+        let forms: Option<Vec<LinearForm>> = self.forces.iter().map(|f| f.linear_form()).collect();
+        let sum = forms?.into_iter().fold(LinearForm::default(), LinearForm::plus);
+        (sum.is_diagonal() && self.magnetic_field == Vec3::zeros()).then_some(sum)
     }
 
     /// Everything that ends flights, in a fixed order.

@@ -8,7 +8,7 @@ use tracer::{Drag, DragLaw, Gas, Method, Options, Outcome, Region, System};
 
 /// The methods that share the deterministic tests, with a step in units of the RF period (or none) and the error that
 /// the step gives on the Mathieu trajectories below, relative to the largest excursion.
-const METHODS: [(Method, Option<f64>, f64); 5] = [
+const METHODS: [(Method, Option<f64>, f64); 6] = [
     // A thousand steps of 1e-13.
     (Method::Dop853, None, 2e-11),
     // (Ω h)² / 24 in the phase of at most 60 rad, and twice that where the motion grows.
@@ -18,6 +18,8 @@ const METHODS: [(Method, Option<f64>, f64); 5] = [
     // second, a wrong coefficient in both.
     (Method::BlanesMoan4, Some(1.0 / 40.0), 1e-6),
     (Method::BlanesMoan6, Some(1.0 / 40.0), 1e-9),
+    // At 20 steps.
+    (Method::BlanesMoan14, Some(1.0 / 20.0), 2e-9),
 ];
 
 #[test]

@@ -113,6 +113,11 @@ fn order_blanes_moan_6() {
 }
 
 #[test]
+fn order_blanes_moan_14() {
+    check(Method::BlanesMoan14, &[15.0, 30.0, 60.0, 120.0]);
+}
+
+#[test]
 fn order_dop853() {
     // A loose tolerance accepts every step at its longest; the few shorter ones at the start, while the control lets steps
     // grow, move the slope a little, and so does the next term, only h smaller: half.

@@ -6,12 +6,14 @@
 //! | `Verlet` | 2 | fixed | long runs, symplectic; stiff drag |
 //! | `Boris` | 2 | fixed | the customary scheme in magnetic fields |
 //! | `Langevin` | 2 (weak) | fixed | noise |
-//! | `BlanesMoan4`, `BlanesMoan6` | 4, 6 | fixed | long runs, symplectic, accurate |
+//! | `BlanesMoan4`, `BlanesMoan6`, `BlanesMoan14` | 4, 6, 6 | fixed | long runs, symplectic, accurate |
 
 pub(crate) mod boris;
 pub(crate) mod dop853;
 pub(crate) mod dop853_table;
 pub(crate) mod langevin;
+pub(crate) mod linear_splitting;
+pub(crate) mod scheme;
 pub(crate) mod splitting;
 
 use crate::block::Block;
@@ -24,6 +26,13 @@ pub(crate) trait Integrator {
 
     /// Fills in what comes of each grain's trial.
     fn advance(&mut self, block: &mut Block);
+
+    /// Carries the grains over several steps at once, as long as those they try, to each of `ends` (s), and fills in what comes
+    /// of them as of one long step: `reach` then holds for all of it. Asked only while all grains are at the same time, for
+    /// steps that all lie between the same corners and samples. `false` when the integrator cannot, and nothing is done.
+    fn leap(&mut self, _block: &mut Block, _ends: &[f64]) -> bool {
+        false
+    }
 
     /// The ways of some grains (by lane) during the step just advanced, pushed to `paths` in that order.
     fn paths(&mut self, block: &mut Block, lanes: &[usize], paths: &mut Vec<Path>);

@@ -1,0 +1,221 @@
+//! What tracing costs at the accuracies that design work asks for: core-seconds beside errors, as rows of a Markdown table.
+//!
+//! `cargo bench -p graintrap-tracer --bench limits`; `-- paul coulomb` runs the rows whose names hold one of the words.
+//! Seconds are processor time of one thread, so that a busy machine gives what an idle one does; the least of three runs.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+use std::time::Instant;
+
+use field::{DrivenField, QuadraticField, Waveform, WaveformPart};
+use meshes::Vec3;
+use tracer::{Batch, Coulomb, Ensemble, Force, Grain, Method, Nothing, Options, Scratch, System, trace};
+
+fn main() {
+    // Everything on the thread that is timed.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
+    pool.build_global().expect("no pool has been used yet");
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    println!("| work | core-seconds | rate | error |\n|---|---|---|---|");
+    let rows: [(&str, fn()); 4] = [("paul", paul), ("pairs", pairs), ("coupled", coupled), ("memory", memory)];
+    for (name, row) in rows {
+        if words.is_empty() || words.iter().any(|word| name.contains(word.as_str())) {
+            row();
+        }
+    }
+}
+
+/// Processor time of this thread so far, s; where the system does not tell, the time of day.
+fn seconds(start: &Instant) -> f64 {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let nanoseconds = told.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
+    nanoseconds.map_or(start.elapsed().as_secs_f64(), |ns| 1e-9 * ns)
+}
+
+/// The least processor time of three runs, s, and what the last gave.
+fn timed<T>(mut work: impl FnMut() -> T) -> (f64, T) {
+    let clock = Instant::now();
+    let mut once = || {
+        let before = seconds(&clock);
+        let out = work();
+        (seconds(&clock) - before, out)
+    };
+    let (first, second, (third, out)) = (once().0, once().0, once());
+    (first.min(second).min(third), out)
+}
+
+fn grain(position: Vec3, velocity: Vec3, id: u64) -> Grain {
+    Grain { position, velocity, charge: 1.0, mass: 1.0, radius: 0.0, id, group: 0 }
+}
+
+fn cloud(count: usize) -> Ensemble {
+    let mut ensemble = Ensemble::new();
+    let mut stream = tracer::stream::Stream::new(3, tracer::stream::Purpose::Start, 0, 0);
+    let mut next = || 2.0 * stream.unit() - 1.0;
+    for k in 0..count {
+        let (r, u) = (Vec3::new(next(), next(), next()), Vec3::new(next(), next(), next()) * 0.1);
+        ensemble.push(grain(r, u, k as u64)).expect("a sound grain");
+    }
+    ensemble
+}
+
+/// u'' + (a - 2 q cos 2t) u = 0 with a = 0, q = 0.2 along x and y and -0.4 along z.
+const Q: [f64; 3] = [0.2, 0.2, -0.4];
+
+fn paul_trap() -> System {
+    let drive = WaveformPart::Sine { amplitude: -0.4, frequency: 2.0 / TAU, phase: 0.0 };
+    let basis = Arc::new(QuadraticField::quadrupole(Vec3::new(1.0, 1.0, -2.0), 1.0));
+    System::new().with_field(DrivenField::new(basis, vec![Waveform { constant: 0.0, parts: vec![drive] }]))
+}
+
+/// The map of (u, u') over a period of the Mathieu equation, by 4000 steps of the classical Runge-Kutta scheme: to 1e-13.
+fn period(q: f64) -> [f64; 4] {
+    let force = |t: f64, u: f64| 2.0 * q * (2.0 * t).cos() * u;
+    let flown = |mut u: f64, mut v: f64| {
+        let h = PI / 4000.0;
+        for k in 0..4000 {
+            let t = h * f64::from(k);
+            let (k1, l1) = (v, force(t, u));
+            let (k2, l2) = (v + 0.5 * h * l1, force(t + 0.5 * h, u + 0.5 * h * k1));
+            let (k3, l3) = (v + 0.5 * h * l2, force(t + 0.5 * h, u + 0.5 * h * k2));
+            let (k4, l4) = (v + h * l3, force(t + h, u + h * k3));
+            u += h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4);
+            v += h / 6.0 * (l1 + 2.0 * (l2 + l3) + l4);
+        }
+        (u, v)
+    };
+    let ((a, c), (b, d)) = (flown(1.0, 0.0), flown(0.0, 1.0));
+    [a, b, c, d]
+}
+
+/// A thousand grains, a thousand periods.
+fn paul() {
+    let grains = cloud(1000);
+    let maps = Q.map(period);
+    let exact = |g: usize, k: usize| {
+        let (mut u, mut v) = (grains.positions()[g][k], grains.velocities()[g][k]);
+        for _ in 0..1000 {
+            let [a, b, c, d] = maps[k];
+            (u, v) = (a * u + b * v, c * u + d * v);
+        }
+        u
+    };
+    let exact: Vec<Vec3> = (0..1000).map(|g| Vec3::new(exact(g, 0), exact(g, 1), exact(g, 2))).collect();
+    let size = (exact.iter().map(Vec3::norm_squared).sum::<f64>() / 1000.0).sqrt();
+    let system = paul_trap();
+    let row = |name: &str, options: &Options| {
+        let (seconds, traced) = timed(|| trace(&system, &grains, options, &Nothing).expect("a sound run"));
+        let off = traced.ensemble.positions().iter().zip(&exact).map(|(a, b)| (a - b).norm_squared()).sum::<f64>();
+        let told = traced.error.map_or("-".into(), |e| format!("{:.1e}", e.position));
+        println!(
+            "| 1000 grains, 1000 RF periods, ideal trap, {name} | {seconds:.3} | {:.0} M steps/s | {:.1e}, told {told} |",
+            traced.accepted as f64 / seconds * 1e-6,
+            (off / 1000.0).sqrt() / size,
+        );
+    };
+    let whole = Options { duration: 1000.0 * PI, ..Options::default() };
+    if std::env::var("SLOW").is_ok() {
+        row("as by default", &whole);
+    }
+    for (method, steps) in [
+        (Method::BlanesMoan14, 8.0),
+        (Method::BlanesMoan14, 10.0),
+        (Method::BlanesMoan14, 20.0),
+        (Method::BlanesMoan6, 16.0),
+    ] {
+        let options = Options { method, step: Some(PI / steps), ..whole.clone() };
+        row(&format!("{method:?}, {steps} steps a period"), &options);
+    }
+    if std::env::var("SLOW").is_ok() {}
+    row("Dop853, 1e-8 a step", &Options { method: Method::Dop853, tolerance: 1e-8, ..whole.clone() });
+}
+
+fn batch<'a>(grains: &'a Ensemble, time: &'a [f64]) -> Batch<'a> {
+    Batch {
+        position: grains.positions(),
+        velocity: grains.velocities(),
+        time,
+        charge: grains.charges(),
+        mass: grains.masses(),
+        radius: grains.radii(),
+        id: grains.ids(),
+    }
+}
+
+/// Root mean square of the differences over that of the second list.
+fn apart(a: &[Vec3], b: &[Vec3]) -> f64 {
+    let off: f64 = a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum();
+    (off / b.iter().map(Vec3::norm_squared).sum::<f64>()).sqrt()
+}
+
+/// Coulomb forces by the direct sum.
+fn pairs() {
+    for (count, times) in [(100, 2000), (1000, 50), (8000, 1)] {
+        let grains = cloud(count);
+        let time = vec![0.0; count];
+        let (mut force, mut slow) = (vec![Vec3::zeros(); count], vec![Vec3::zeros(); count]);
+        let mut scratch = Scratch::default();
+        let (seconds, ()) = timed(|| {
+            for _ in 0..times {
+                force.fill(Vec3::zeros());
+                Coulomb::default().add(&batch(&grains, &time), &mut scratch, &mut force);
+            }
+        });
+        tracer::force::coulomb::slow_coulomb(&batch(&grains, &time), &mut slow);
+        println!(
+            "| Coulomb forces, {count} grains, direct | {:.2e} | {:.2} G pairs/s | {:.1e} |",
+            seconds / f64::from(times),
+            (count * count) as f64 * f64::from(times) / seconds * 1e-9,
+            apart(&force, &slow),
+        );
+    }
+}
+
+/// A step of ten grains that repel each other in a trap.
+fn coupled() {
+    let grains = cloud(10);
+    let mut weak = Ensemble::new();
+    for k in 0..10 {
+        weak.push(Grain { charge: 1e-7, mass: 1e-7, ..grains.grain(k) }).expect("a sound grain");
+    }
+    let system = paul_trap().with_coulomb();
+    for (method, steps) in [(Method::Verlet, 100.0), (Method::BlanesMoan14, 16.0), (Method::Dop853, 16.0)] {
+        let options = Options {
+            method,
+            step: Some(PI / steps),
+            duration: 1000.0 * PI,
+            estimate_error: false,
+            ..Options::default()
+        };
+        let (seconds, traced) = timed(|| trace(&system, &weak, &options, &Nothing).expect("a sound run"));
+        let taken = traced.accepted as f64 / 10.0;
+        println!(
+            "| ten coupled grains, {method:?} | {seconds:.3} | {:.2} µs/step, {:.2} µs/force | - |",
+            seconds / taken * 1e6,
+            seconds / traced.force_evaluations as f64 * 1e7,
+        );
+    }
+}
+
+/// Peak memory of a million grains that do not feel each other, without samples.
+fn memory() {
+    let peak = || {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let line = status.lines().find(|line| line.starts_with("VmHWM")).unwrap_or_default();
+        line.split_whitespace().nth(1).and_then(|kb| kb.parse::<f64>().ok()).unwrap_or(f64::NAN) * 1024.0
+    };
+    let count = 1_000_000;
+    let grains = cloud(count);
+    let before = peak();
+    let options = Options { duration: PI, estimate_error: false, ..Options::default() };
+    let clock = Instant::now();
+    let start = seconds(&clock);
+    let traced = trace(&paul_trap(), &grains, &options, &Nothing).expect("a sound run");
+    println!(
+        "| 1e6 independent grains, one period | {:.2} | {:.0} bytes a grain beside the ensemble's {:.0} | - |",
+        seconds(&clock) - start,
+        (peak() - before) / count as f64,
+        before / count as f64,
+    );
+    drop(traced);
+}
