@@ -17,7 +17,8 @@ fn main() {
     pool.build_global().expect("no pool has been used yet");
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     println!("| work | core-seconds | rate | error |\n|---|---|---|---|");
-    let rows: [(&str, fn()); 4] = [("paul", paul), ("pairs", pairs), ("coupled", coupled), ("memory", memory)];
+    let rows: [(&str, fn()); 5] =
+        [("paul", paul), ("adaptive", adaptive), ("pairs", pairs), ("coupled", coupled), ("memory", memory)];
     for (name, row) in rows {
         if words.is_empty() || words.iter().any(|word| name.contains(word.as_str())) {
             row();
@@ -90,6 +91,26 @@ fn period(q: f64) -> [f64; 4] {
 
 /// A thousand grains, a thousand periods.
 fn paul() {
+    let whole = Options { duration: 1000.0 * PI, ..Options::default() };
+    let with = |method, steps: f64| {
+        (format!("{method:?}, {steps} steps a period"), Options { method, step: Some(PI / steps), ..whole.clone() })
+    };
+    thousand(&[
+        ("as by default".into(), whole.clone()),
+        ("tolerance 1e-8".into(), Options { tolerance: 1e-8, ..whole.clone() }),
+        with(Method::BlanesMoan14, 8.0),
+        with(Method::BlanesMoan14, 10.0),
+        with(Method::BlanesMoan6, 16.0),
+    ]);
+}
+
+/// The same with an adaptive integrator that asks for the field point by point.
+fn adaptive() {
+    let options = Options { method: Method::Dop853, duration: 1000.0 * PI, tolerance: 1e-8, ..Options::default() };
+    thousand(&[("Dop853, 1e-8 a step".into(), options)]);
+}
+
+fn thousand(runs: &[(String, Options)]) {
     let grains = cloud(1000);
     let maps = Q.map(period);
     let exact = |g: usize, k: usize| {
@@ -103,7 +124,7 @@ fn paul() {
     let exact: Vec<Vec3> = (0..1000).map(|g| Vec3::new(exact(g, 0), exact(g, 1), exact(g, 2))).collect();
     let size = (exact.iter().map(Vec3::norm_squared).sum::<f64>() / 1000.0).sqrt();
     let system = paul_trap();
-    let row = |name: &str, options: &Options| {
+    for (name, options) in runs {
         let (seconds, traced) = timed(|| trace(&system, &grains, options, &Nothing).expect("a sound run"));
         let off = traced.ensemble.positions().iter().zip(&exact).map(|(a, b)| (a - b).norm_squared()).sum::<f64>();
         let told = traced.error.map_or("-".into(), |e| format!("{:.1e}", e.position));
@@ -112,22 +133,7 @@ fn paul() {
             traced.accepted as f64 / seconds * 1e-6,
             (off / 1000.0).sqrt() / size,
         );
-    };
-    let whole = Options { duration: 1000.0 * PI, ..Options::default() };
-    if std::env::var("SLOW").is_ok() {
-        row("as by default", &whole);
     }
-    for (method, steps) in [
-        (Method::BlanesMoan14, 8.0),
-        (Method::BlanesMoan14, 10.0),
-        (Method::BlanesMoan14, 20.0),
-        (Method::BlanesMoan6, 16.0),
-    ] {
-        let options = Options { method, step: Some(PI / steps), ..whole.clone() };
-        row(&format!("{method:?}, {steps} steps a period"), &options);
-    }
-    if std::env::var("SLOW").is_ok() {}
-    row("Dop853, 1e-8 a step", &Options { method: Method::Dop853, tolerance: 1e-8, ..whole.clone() });
 }
 
 fn batch<'a>(grains: &'a Ensemble, time: &'a [f64]) -> Batch<'a> {

@@ -62,9 +62,9 @@ pub(crate) const LEAST_TRAVEL: f64 = 1e-3;
 /// costs 200 µs, because all panels are about as far; to learn that none is within 32 steps costs 1 µs, every 32 steps.
 const LOOK_AHEAD: f64 = 32.0;
 
-/// Most steps that are tried at once: their coefficients (fifteen kicks of 56 bytes each) stay in the second cache, and what the
+/// Most steps that are tried at once: their coefficients (fifteen kicks of 72 bytes each) stay in the first cache, and what the
 /// loop does between them no longer shows.
-const LONGEST_LEAP: u64 = 64;
+const LONGEST_LEAP: u64 = 32;
 
 /// Rounds between looks at the progress meter.
 const ROUNDS: u64 = 16;

@@ -1,6 +1,6 @@
 //! Forces that are linear in the position.
 
-use field::Waveform;
+use field::{Waveform, WaveformPart};
 use meshes::Vec3;
 use nalgebra::Matrix3;
 
@@ -42,6 +42,18 @@ impl LinearForm {
     /// Whether the axes do not mix: each component of the force depends on that of the position alone.
     pub fn is_diagonal(&self) -> bool {
         self.channels.iter().all(|c| c.hessian == Matrix3::from_diagonal(&c.hessian.diagonal()))
+    }
+
+    /// A bound of |Σ V_c(t) H_c| along the axes, at any time, V/m².
+    pub fn steepest(&self) -> f64 {
+        let part = |part: &WaveformPart| match part {
+            WaveformPart::Sine { amplitude, .. }
+            | WaveformPart::Square { amplitude, .. }
+            | WaveformPart::Ramp { amplitude, .. } => amplitude.abs(),
+            WaveformPart::Sampled { values, scale, .. } => values.iter().fold(0.0_f64, |m, v| m.max((scale * v).abs())),
+        };
+        let volts = |w: &Waveform| w.constant.abs() + w.parts.iter().map(part).sum::<f64>();
+        self.channels.iter().map(|c| c.hessian.diagonal().amax() * volts(&c.waveform)).sum()
     }
 
     /// Σ V_c(t) H_c, along the axes, and Σ V_c(t) s_c: the force on a charge of 1 C is the second minus the first times the

@@ -42,7 +42,7 @@ struct Stage {
     kick: f64,
 }
 
-/// A kick on a charge of 1 C and a mass of 1 kg.
+/// A kick on a charge of 1 C and a mass of 1 kg, and the flight before it.
 #[derive(Clone, Copy, Default)]
 struct Kick {
     /// -b h Σ V H along the axes, 1/s.
@@ -51,6 +51,10 @@ struct Kick {
     push: [f64; 3],
     /// b h, s.
     time: f64,
+    /// How far the flight before it goes at unit speed without drag, s.
+    shift: f64,
+    /// Which of the flights of different lengths that is.
+    flight: usize,
 }
 
 /// The grains in arrays of their own, filled up to whole vectors.
@@ -113,15 +117,18 @@ impl LinearSplitting {
         let (mut from, mut steepest, mut strongest) = (start, 0.0_f64, 0.0_f64);
         for &end in ends {
             for stage in &self.stages {
-                if stage.kick == 0.0 {
-                    self.kicks.push(Kick::default());
-                    continue;
+                let lengths = self.scheme.lengths();
+                let shift = lengths.get(stage.flight).map_or(0.0, |part| part * step);
+                let mut kick = Kick { shift, flight: stage.flight, ..Kick::default() };
+                if stage.kick != 0.0 {
+                    let (slope, field) = self.form.at(block.forces.within(from + stage.at * step, from, end));
+                    kick.time = stage.kick * step;
+                    kick.slope = (slope * -kick.time).into();
+                    kick.push = (field * kick.time).into();
+                    steepest = steepest.max(slope.amax());
+                    strongest = strongest.max(field.amax());
                 }
-                let (slope, field) = self.form.at(block.forces.within(from + stage.at * step, from, end));
-                let time = stage.kick * step;
-                self.kicks.push(Kick { slope: (slope * -time).into(), push: (field * time).into(), time });
-                steepest = steepest.max(slope.amax());
-                strongest = strongest.max(field.amax());
+                self.kicks.push(kick);
             }
             from = end;
         }
@@ -153,7 +160,7 @@ impl Integrator for LinearSplitting {
                 kick.slope = kick.slope.map(|slope| charge * slope);
             }
         }
-        let flight = Flight { stages: &self.stages, kicks: &self.kicks, lanes: &mut self.lanes };
+        let flight = Flight { stages: self.stages.len(), kicks: &self.kicks, lanes: &mut self.lanes };
         match (flight.lanes.damped, self.unpushed, flight.lanes.uniform) {
             (false, true, true) => self.arch.dispatch(Variant::<false, false, true>(flight)),
             (false, true, false) => self.arch.dispatch(Variant::<false, false, false>(flight)),
@@ -236,7 +243,8 @@ impl Lanes {
 
 /// What is to be flown: `kicks` has one entry for each stage of each step.
 struct Flight<'a> {
-    stages: &'a [Stage],
+    /// Of one step.
+    stages: usize,
     kicks: &'a [Kick],
     lanes: &'a mut Lanes,
 }
@@ -251,13 +259,8 @@ impl<const DAMPED: bool, const PUSHED: bool, const UNIFORM: bool> WithSimd for V
         let mut flight = self.0;
         let vectors = flight.lanes.charge.len() / S::F64_LANES;
         let mut first = 0;
-        // With 32 registers three vectors of each number stay in them, with 16 two; their chains of operations overlap.
-        if S::F64_LANES >= 8 {
-            while first + 3 <= vectors {
-                fly::<S, 3, DAMPED, PUSHED, UNIFORM>(simd, &mut flight, first);
-                first += 3;
-            }
-        }
+        // Two vectors of each number stay in 16 registers, and their chains of operations overlap. (Three would fit in 32; they
+        // were slower.)
         while first + 2 <= vectors {
             fly::<S, 2, DAMPED, PUSHED, UNIFORM>(simd, &mut flight, first);
             first += 2;
@@ -286,10 +289,10 @@ fn fly<S: Simd, const T: usize, const DAMPED: bool, const PUSHED: bool, const UN
     let charge = load(&lanes.charge);
     let zero = simd.splat_f64s(0.0);
     let (mut far, mut fast) = ([zero; T], [zero; T]);
-    for kicks in kicks.chunks_exact(stages.len()) {
-        for (stage, kick) in stages.iter().zip(kicks) {
-            let (shifts, decays) = &lanes.flights[stage.flight];
+    for kicks in kicks.chunks_exact(*stages) {
+        for kick in kicks {
             if DAMPED {
+                let (shifts, decays) = &lanes.flights[kick.flight];
                 let (shift, decay) = (load(shifts), load(decays));
                 for t in 0..T {
                     for k in 0..3 {
@@ -299,7 +302,7 @@ fn fly<S: Simd, const T: usize, const DAMPED: bool, const PUSHED: bool, const UN
                 }
             } else {
                 // The same for all grains.
-                let shift = simd.splat_f64s(shifts[0]);
+                let shift = simd.splat_f64s(kick.shift);
                 for t in 0..T {
                     for k in 0..3 {
                         x[k][t] = simd.mul_add_f64s(shift, v[k][t], x[k][t]);
@@ -338,14 +341,17 @@ fn fly<S: Simd, const T: usize, const DAMPED: bool, const PUSHED: bool, const UN
             fast[t] = simd.max_f64s(fast[t], speed);
         }
     }
-    let store = |list: &mut [f64], values: &[S::f64s; T]| {
+    // By value: references to the numbers would keep them in memory all the way.
+    let store = |list: &mut [f64], values: [S::f64s; T]| {
         let (list, _) = S::as_mut_simd_f64s(list);
-        list[first..first + T].copy_from_slice(values);
+        for t in 0..T {
+            list[first + t] = values[t];
+        }
     };
     for k in 0..3 {
-        store(&mut lanes.end[k], &x[k]);
-        store(&mut lanes.end[3 + k], &v[k]);
+        store(&mut lanes.end[k], x[k]);
+        store(&mut lanes.end[3 + k], v[k]);
     }
-    store(&mut lanes.far, &far);
-    store(&mut lanes.fast, &fast);
+    store(&mut lanes.far, far);
+    store(&mut lanes.fast, fast);
 }
