@@ -17,8 +17,14 @@ fn main() {
     pool.build_global().expect("no pool has been used yet");
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     println!("| work | core-seconds | rate | error |\n|---|---|---|---|");
-    let rows: [(&str, fn()); 5] =
-        [("paul", paul), ("adaptive", adaptive), ("pairs", pairs), ("coupled", coupled), ("memory", memory)];
+    let rows: [(&str, fn()); 6] = [
+        ("paul", paul),
+        ("adaptive", adaptive),
+        ("pairs", pairs),
+        ("coupled", coupled),
+        ("many", many),
+        ("memory", memory),
+    ];
     for (name, row) in rows {
         if words.is_empty() || words.iter().any(|word| name.contains(word.as_str())) {
             row();
@@ -173,6 +179,44 @@ fn pairs() {
             seconds / f64::from(times),
             (count * count) as f64 * f64::from(times) / seconds * 1e-9,
             apart(&force, &slow),
+        );
+    }
+}
+
+/// Coulomb forces by multipoles; the error at a thousand of the grains, over the size of all forces.
+fn many() {
+    for (count, accuracy) in [
+        (4001, None),
+        (4001, Some(1e-4)),
+        (4001, Some(1e-6)),
+        (100_000, Some(1e-4)),
+        (100_000, Some(1e-6)),
+        (1_000_000, Some(1e-4)),
+    ] {
+        let grains = cloud(count);
+        let time = vec![0.0; count];
+        let mut force = vec![Vec3::zeros(); count];
+        let mut scratch = Scratch::default();
+        let sum = Coulomb { accuracy };
+        let (seconds, ()) = timed(|| {
+            force.fill(Vec3::zeros());
+            sum.add(&batch(&grains, &time), &mut scratch, &mut force);
+        });
+        let (mut off, mut size) = (0.0, 0.0);
+        for i in (0..count).step_by(count / 1000) {
+            let mut exact = Vec3::zeros();
+            for (j, r) in grains.positions().iter().enumerate().filter(|(j, _)| *j != i) {
+                let d = grains.positions()[i] - r;
+                exact += d * (field::constants::COULOMB * grains.charges()[j] / d.norm().powi(3));
+            }
+            off += (force[i] - exact).norm_squared();
+            size += exact.norm_squared();
+        }
+        let how = accuracy.map_or("direct".into(), |accuracy| format!("{accuracy:.0e} asked"));
+        println!(
+            "| Coulomb forces, {count} grains, {how} | {seconds:.3} | {:.2} M grains/s | {:.1e} |",
+            count as f64 / seconds * 1e-6,
+            (off / size).sqrt(),
         );
     }
 }

@@ -59,9 +59,14 @@ impl System {
         self.with_force(ConstantForce { force })
     }
 
-    /// Adds the mutual force of the grains.
+    /// Adds the mutual force of the grains, every pair of them.
     pub fn with_coulomb(self) -> Self {
-        self.with_force(Coulomb)
+        self.with_force(Coulomb::default())
+    }
+
+    /// Adds the mutual force of the grains, for many of them to this accuracy ([`Coulomb::accuracy`]).
+    pub fn with_coulomb_to(self, accuracy: f64) -> Self {
+        self.with_force(Coulomb { accuracy: Some(accuracy) })
     }
 
     /// Sets the drag.

@@ -106,4 +106,6 @@ pub struct Scratch {
     pub scalar: Vec<f64>,
     /// One vector for each grain.
     pub vector: Vec<Vec3>,
+    /// Any numbers.
+    pub numbers: Vec<f64>,
 }
