@@ -17,11 +17,12 @@ fn main() {
     pool.build_global().expect("no pool has been used yet");
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     println!("| work | core-seconds | rate | error |\n|---|---|---|---|");
-    let rows: [(&str, fn()); 6] = [
+    let rows: [(&str, fn()); 7] = [
         ("paul", paul),
         ("adaptive", adaptive),
         ("pairs", pairs),
         ("coupled", coupled),
+        ("stability", stability),
         ("many", many),
         ("memory", memory),
     ];
@@ -181,6 +182,22 @@ fn pairs() {
             apart(&force, &slow),
         );
     }
+}
+
+/// Maps of the first region of stability, 200 x 200; the error is the part of the map that differs from Floquet's.
+fn stability() {
+    use tracer::stability::{mathieu_map, mathieu_map_by_flights};
+    let a: Vec<f64> = (0..200).map(|i| -0.2 + 0.0035 * f64::from(i)).collect();
+    let q: Vec<f64> = (0..200).map(|j| 0.005 * (0.5 + f64::from(j))).collect();
+    let (floquet, exact) = timed(|| mathieu_map(&a, &q, 0.0));
+    let (flights, flown) = timed(|| mathieu_map_by_flights(&a, &q, 100, 1e2));
+    let differ = (0..40_000).filter(|k| exact.is_stable(k / 200, k % 200) != flown.is_stable(k / 200, k % 200)).count();
+    println!("| stability map 200 x 200, Floquet | {floquet:.4} | {:.0} M points/s | - |", 0.04 / floquet);
+    println!(
+        "| the same by flights of 100 periods | {flights:.4} | {:.0} M periods/s | {:.1e} |",
+        4.0 / flights,
+        differ as f64 / 40_000.0
+    );
 }
 
 /// Coulomb forces by multipoles; the error at a thousand of the grains, over the size of all forces.

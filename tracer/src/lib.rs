@@ -93,6 +93,7 @@ pub mod grains;
 pub mod observer;
 pub mod options;
 pub mod outcome;
+pub mod stability;
 pub mod stream;
 pub mod system;
 pub mod trace;

@@ -173,7 +173,7 @@ impl System {
         out.fill(zero);
         for force in &self.forces {
             let force = force.as_ref();
-            if force.nature().couples_grains || batch.len() <= 2 * PART {
+            if batch.len() <= 2 * PART || force.nature().couples_grains {
                 add(force, batch, scratch, out);
             } else {
                 use rayon::prelude::*;

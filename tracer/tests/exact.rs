@@ -154,6 +154,54 @@ fn exact_half_trace_of_one_period() {
 }
 
 #[test]
+fn exact_stability_by_floquet() {
+    use tracer::stability::mathieu_map;
+    for case in cases("mathieu", "beta.") {
+        let map = mathieu_map(&[case.number("a")], &[case.number("q")], 0.0);
+        let exact = case.number("half_trace_cos_pi_beta");
+        assert!((map.value[0] - exact).abs() < 1e-9 * exact.abs().max(1.0), "{}: {} {exact}", case.id(), map.value[0]);
+        assert_eq!(map.is_stable(0, 0), exact.abs() < 1.0);
+    }
+    // Limits with drag, by bisection: to the error of the half trace over its slope there, which is near one.
+    for case in cases("mathieu", "damped_limit.") {
+        let (a, k, exact) = (case.number("a"), case.number("k"), case.number("q_max"));
+        let (mut low, mut high) = (0.9 * exact, 1.05 * exact);
+        while high - low > 1e-11 {
+            let middle = 0.5 * (low + high);
+            if mathieu_map(&[a], &[middle], k).is_stable(0, 0) { low = middle } else { high = middle }
+        }
+        assert!((low - exact).abs() < 1e-8, "{}: {low} {exact}", case.id());
+    }
+}
+
+#[test]
+fn exact_stability_by_flights() {
+    use tracer::stability::{mathieu_map, mathieu_map_by_flights};
+    // The first region and its surroundings, 200 x 200: the two maps differ where the half trace is so close to one that a
+    // hundred periods do not tell, which is along the limits.
+    let a: Vec<f64> = (0..200).map(|i| -0.2 + 0.0035 * f64::from(i)).collect();
+    let q: Vec<f64> = (0..200).map(|j| 0.005 * (0.5 + f64::from(j))).collect();
+    let exact = mathieu_map(&a, &q, 0.0);
+    let flown = mathieu_map_by_flights(&a, &q, 100, 1e2);
+    let (mut differ, mut stable) = (0, 0);
+    for i in 0..200 {
+        for j in 0..200 {
+            stable += usize::from(exact.is_stable(i, j));
+            if exact.is_stable(i, j) != flown.is_stable(i, j) {
+                differ += 1;
+                // Growth e^(μ π) a period with cosh(μ π) the half trace: e^5 in 100 periods takes 1e-3 above one.
+                let excess = exact.value[i * 200 + j].abs() - 1.0;
+                assert!((-1e-4..3e-3).contains(&excess), "a = {}, q = {}: {excess}", a[i], q[j]);
+            }
+        }
+    }
+    assert!(stable > 5000 && differ < 400, "{differ} differ, {stable} of 40000 are stable");
+    // The tip of the region along a = 0, as it stands in the tables.
+    let tip = mathieu_map(&[0.0], &[0.90804, 0.90805], 0.0);
+    assert!(tip.is_stable(0, 0) && !tip.is_stable(0, 1));
+}
+
+#[test]
 fn exact_damped_limits() {
     for case in cases("mathieu", "damped_limit.") {
         let (a, k) = (case.number("a"), case.number("k"));

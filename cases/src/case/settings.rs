@@ -81,6 +81,8 @@ pub struct Forces {
     pub constant: Vec3,
     /// Grains repel each other.
     pub coulomb: bool,
+    /// Relative error that this may have with many grains; `None`: that of the trajectories.
+    pub coulomb_accuracy: Option<f64>,
     /// T.
     pub magnetic_field: Vec3,
     /// Temperature of the random kicks of the gas, K; then there is a drag.

@@ -96,6 +96,9 @@ pub(crate) struct ForceKeys {
     pub constant: Option<Vector<Force>>,
     /// Whether grains repel each other; left out: they do not.
     pub coulomb: Option<bool>,
+    /// Relative error that the repulsion of some thousand grains and more may have; fewer are summed pair by pair. Left out:
+    /// that of `trace.accuracy`.
+    pub coulomb_accuracy: Option<Fraction>,
     /// Magnetic field; left out: none.
     pub magnetic_field: Option<Vector<MagneticField>>,
     /// Temperature of the random kicks of the gas (needs `drag`); left out: no kicks.

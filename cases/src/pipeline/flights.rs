@@ -141,7 +141,11 @@ pub fn system(case: &Case, field: DrivenField, surface: Option<Arc<SurfaceTree>>
         .with_magnetic_field(case.forces.magnetic_field)
         .with_region(region);
     if case.forces.coulomb {
-        system = system.with_coulomb();
+        let accuracy = case.forces.coulomb_accuracy.or(case.trace.as_ref().map(|settings| settings.accuracy));
+        system = match accuracy {
+            Some(accuracy) => system.with_coulomb_to(accuracy),
+            None => system.with_coulomb(),
+        };
     }
     if let Some(drag) = drag(&case.forces.drag) {
         system = system.with_drag(drag);
