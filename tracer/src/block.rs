@@ -21,6 +21,8 @@ pub(crate) struct Block<'a> {
     pub seed: u64,
     /// Relative error a step may make.
     pub tolerance: f64,
+    /// Whether anything can end a flight on its way, so that `reach` is wanted.
+    pub watched: bool,
     /// Length below which motions need not be resolved relative to themselves, m.
     pub least_travel: f64,
 }
@@ -90,6 +92,7 @@ impl<'a> Block<'a> {
             trial: vec![Trial::default(); grains.len()],
             seed: 0,
             tolerance: 0.0,
+            watched: true,
             least_travel: 0.0,
         })
     }

@@ -90,6 +90,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
         block.seed = run.options.seed;
         block.tolerance = run.options.tolerance;
         block.least_travel = run.least_travel;
+        block.watched = !run.events.is_empty();
         let start = run.options.start;
         let margin = block.forces.margin(start, start);
         let lanes = grains.iter().enumerate().map(|(lane, &grain)| {
@@ -510,11 +511,11 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
         state.time = trial.end;
         state.motion = trial.motion;
         state.fresh = trial.fresh;
-        state.travel = state.travel.max((trial.motion.position - state.origin).norm());
-        state.top_speed = state.top_speed.max(trial.motion.velocity.norm());
         l.number += trial.steps;
         l.grid.taken = (l.grid.taken + trial.steps).min(l.grid.count);
         if self.nature.adaptive {
+            state.travel = state.travel.max((trial.motion.position - state.origin).norm());
+            state.top_speed = state.top_speed.max(trial.motion.velocity.norm());
             let factor = if l.rejected { grow(trial.error).min(1.0) } else { grow(trial.error) };
             // A step cut short by a stop says nothing against the longer one that was wanted.
             let cut = factor >= 1.0 && trial.step < 0.99 * l.wanted.min(run.max_step);

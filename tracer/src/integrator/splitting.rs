@@ -22,6 +22,7 @@ pub(crate) struct Splitting {
     velocity: Vec<Vec3>,
     time: Vec<f64>,
     acceleration: Vec<Vec3>,
+    /// Square of the strongest acceleration of the step, m²/s⁴.
     strongest: Vec<f64>,
     flows: Vec<Flows>,
 }
@@ -86,7 +87,7 @@ impl Integrator for Splitting {
             self.position.push(motion.position);
             self.velocity.push(motion.velocity);
             self.acceleration.push(motion.acceleration);
-            self.strongest.push(if scheme.outer_kicks { motion.acceleration.norm() } else { 0.0 });
+            self.strongest.push(if scheme.outer_kicks { motion.acceleration.norm_squared() } else { 0.0 });
             let flows = &mut self.flows[lane];
             if flows.of != of && !of.0.is_free() {
                 flows.of = of;
@@ -113,7 +114,7 @@ impl Integrator for Splitting {
             }
             block.forces.accelerations(&self.time, &self.position, &self.velocity, &mut self.acceleration);
             for (strongest, a) in self.strongest.iter_mut().zip(&self.acceleration) {
-                *strongest = strongest.max(a.norm());
+                *strongest = strongest.max(a.norm_squared());
             }
             self.kick(block, scheme.kick(flight + outer));
         }
@@ -124,7 +125,12 @@ impl Integrator for Splitting {
             trial.motion.velocity = self.velocity[lane];
             trial.motion.acceleration = self.acceleration[lane];
             trial.fresh = scheme.outer_kicks;
-            let fastest = before.norm().max(trial.motion.velocity.norm()) + self.strongest[lane] * trial.step;
+            if !block.watched {
+                trial.reach = 0.0;
+                continue;
+            }
+            let fastest = before.norm_squared().max(trial.motion.velocity.norm_squared()).sqrt()
+                + self.strongest[lane].sqrt() * trial.step;
             trial.reach = fastest * trial.step;
         }
     }
