@@ -51,6 +51,8 @@ pub(crate) struct Trial {
     pub step: f64,
     /// s.
     pub end: f64,
+    /// Whether it is the first of even steps.
+    pub first: bool,
     /// How many steps of length `step` it stands for.
     pub steps: u64,
     /// Number of the step, for the random numbers.

@@ -28,6 +28,9 @@ pub enum Method {
     /// Blanes and Moan's composition of order 6 with the smallest error (fourteen forces a step): in a Paul trap 1e-6 after 1000
     /// periods takes 140 forces a period, where the one with eleven takes 176.
     BlanesMoan14,
+    /// Störmer's multistep scheme of order 12: one force a step, dense output, for smooth forces without magnetic field. In a Paul
+    /// trap 1e-6 after 1000 periods takes 36 forces a period.
+    Stoermer12,
 }
 
 /// Called with the fraction that is done, from 0 to 1, at most about a thousand times, from any thread.

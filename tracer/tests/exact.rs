@@ -8,7 +8,7 @@ use tracer::{Drag, DragLaw, Gas, Method, Options, Outcome, Region, System};
 
 /// The methods that share the deterministic tests, with a step in units of the RF period (or none) and the error that
 /// the step gives on the Mathieu trajectories below, relative to the largest excursion.
-const METHODS: [(Method, Option<f64>, f64); 6] = [
+const METHODS: [(Method, Option<f64>, f64); 7] = [
     // A thousand steps of 1e-13.
     (Method::Dop853, None, 2e-11),
     // (Ω h)² / 24 in the phase of at most 60 rad, and twice that where the motion grows.
@@ -20,6 +20,7 @@ const METHODS: [(Method, Option<f64>, f64); 6] = [
     (Method::BlanesMoan6, Some(1.0 / 40.0), 1e-9),
     // At 20 steps.
     (Method::BlanesMoan14, Some(1.0 / 20.0), 2e-9),
+    (Method::Stoermer12, Some(1.0 / 60.0), 2e-9),
 ];
 
 #[test]
@@ -114,6 +115,28 @@ fn exact_mathieu_samples_between_steps() {
             assert!((sample.potential_energy - 0.5 * drive * sample.position.x.powi(2)).abs() < 1e-14);
         }
     }
+}
+
+#[test]
+fn exact_samples_between_steps_of_a_multistep() {
+    // Quintics through the ends of steps: h⁶/46080 of the sixth derivative, 64 at twice the RF's phase, with h = π/60.
+    for case in cases("mathieu", "trajectory.a=0.q=0.4.k=0") {
+        let (zeta, u, du) = (case.list("zeta"), case.list("u"), case.list("du_dzeta"));
+        for n in 0..zeta.len() {
+            let step = Some(PI / 60.0);
+            let options = Options { every: Some(zeta[n] / 7.0), step, ..options(Method::Stoermer12, 1.3 * zeta[n]) };
+            let grains = ensemble([grain(v(1.0, 0.0, 0.0), v(0.0, 0.0, 0.0), 1.0, 1.0)]);
+            let (tracks, _) = samples(&mathieu(0.0, 0.4), &grains, &options);
+            assert_eq!(tracks[0].len(), 11, "0 to 9 sevenths and the end");
+            let sample = tracks[0][7];
+            assert!((sample.position.x - u[n]).abs() < 1e-9, "{:e}", sample.position.x - u[n]);
+            assert!((sample.velocity.x - du[n]).abs() < 1e-7, "{:e}", sample.velocity.x - du[n]);
+        }
+    }
+    let refused = System::new().with_magnetic_field(v(0.0, 0.0, 1.0));
+    let grains = ensemble([grain(v(1.0, 0.0, 0.0), v(0.0, 0.0, 0.0), 1.0, 1.0)]);
+    let error = tracer::trace(&refused, &grains, &options(Method::Stoermer12, 1.0), &tracer::Nothing).unwrap_err();
+    assert!(error.to_string().contains("there is a magnetic field"), "{error}");
 }
 
 #[test]
@@ -360,9 +383,12 @@ fn exact_two_grains_collide_as_kepler_says() {
     let grains =
         ensemble([grain(r0 * 0.5, u0 * 0.5 + drift, charge, mass), grain(-r0 * 0.5, -u0 * 0.5 + drift, charge, mass)]);
     let system = System::new().with_coulomb();
-    for (method, steps, allowed) in
-        [(Method::Dop853, 1.0, 1e-10), (Method::Verlet, 2e4, 1e-5), (Method::BlanesMoan6, 2e3, 1e-8)]
-    {
+    for (method, steps, allowed) in [
+        (Method::Dop853, 1.0, 1e-10),
+        (Method::Verlet, 2e4, 1e-5),
+        (Method::BlanesMoan6, 2e3, 1e-8),
+        (Method::Stoermer12, 4e3, 1e-8),
+    ] {
         let options = Options { step: Some(time / steps), ..options(method, time) };
         let traced = run(&system, &grains, &options);
         let (p, w) = (traced.ensemble.positions(), traced.ensemble.velocities());

@@ -234,14 +234,15 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
                 (end - state.time, end)
             } else {
                 if l.grid.taken == l.grid.count {
-                    let stop = self.run.options.end().min(l.corner).min(self.run.sample_time(l.sample));
+                    let sample = if self.nature.dense { f64::INFINITY } else { self.run.sample_time(l.sample) };
+                    let stop = self.run.options.end().min(l.corner).min(sample);
                     l.grid = Grid::new(state.time, stop, self.run.step.min(self.run.max_step));
                 }
                 (l.grid.step, l.grid.next_end())
             };
             let trial = &mut self.block.trial[lane];
             (trial.step, trial.end, trial.number, trial.error) = (step, end, l.number, 0.0);
-            trial.steps = 1;
+            (trial.steps, trial.first) = (1, l.grid.taken == 0);
         }
     }
 
@@ -405,7 +406,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
         let mut all = false;
         for lane in (0..self.lanes.len()).filter(|&lane| good[lane]) {
             let sampled =
-                self.nature.adaptive && self.run.sample_time(self.lanes[lane].sample) < self.block.trial[lane].end;
+                self.nature.dense && self.run.sample_time(self.lanes[lane].sample) < self.block.trial[lane].end;
             let met = self.lanes[lane].fate.is_none() && self.may_meet(lane);
             if sampled || met {
                 self.path_lanes.push(lane);
@@ -566,6 +567,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
             self.result.flown.push(Flown { grain: l.grain, ending, position, velocity });
         }
         self.block.retain(&keep);
+        self.integrator.retain(&keep, self.run.shared);
         retain(&mut self.lanes, &keep);
         if self.run.shared {
             // The others no longer feel those that have ended.

@@ -139,7 +139,13 @@ impl LinearSplitting {
 
 impl Integrator for LinearSplitting {
     fn nature(&self) -> IntegratorNature {
-        IntegratorNature { order: self.scheme.order, adaptive: false, random: false, starts_from_force: false }
+        IntegratorNature {
+            order: self.scheme.order,
+            adaptive: false,
+            dense: false,
+            random: false,
+            starts_from_force: false,
+        }
     }
 
     fn advance(&mut self, block: &mut Block) {

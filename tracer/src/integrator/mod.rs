@@ -6,6 +6,7 @@
 //! | `Verlet` | 2 | fixed | long runs, symplectic; stiff drag |
 //! | `Boris` | 2 | fixed | the customary scheme in magnetic fields |
 //! | `Langevin` | 2 (weak) | fixed | noise |
+//! | `Stoermer12` | 12 | fixed | smooth fields that are dear: one force a step |
 //! | `BlanesMoan4`, `BlanesMoan6`, `BlanesMoan14` | 4, 6, 6 | fixed | long runs, symplectic, accurate |
 
 pub(crate) mod boris;
@@ -15,6 +16,7 @@ pub(crate) mod langevin;
 pub(crate) mod linear_splitting;
 pub(crate) mod scheme;
 pub(crate) mod splitting;
+pub(crate) mod stoermer;
 
 use crate::block::Block;
 use crate::path::Path;
@@ -34,6 +36,10 @@ pub(crate) trait Integrator {
         false
     }
 
+    /// Told when grains leave the block, those whose flag is false; and whether the others' forces change by that, so that
+    /// what was known of them no longer holds.
+    fn retain(&mut self, _keep: &[bool], _forget: bool) {}
+
     /// The ways of some grains (by lane) during the step just advanced, pushed to `paths` in that order.
     fn paths(&mut self, block: &mut Block, lanes: &[usize], paths: &mut Vec<Path>);
 }
@@ -45,6 +51,8 @@ pub(crate) struct IntegratorNature {
     pub order: u32,
     /// Estimates its error, so that steps can follow it.
     pub adaptive: bool,
+    /// Its paths are as good as its steps, so that samples need not be ends of steps.
+    pub dense: bool,
     /// Draws random numbers.
     pub random: bool,
     /// Needs the acceleration at the start of a step.

@@ -72,7 +72,7 @@ impl Splitting {
 impl Integrator for Splitting {
     fn nature(&self) -> IntegratorNature {
         let starts_from_force = self.scheme.outer_kicks;
-        IntegratorNature { order: self.scheme.order, adaptive: false, random: false, starts_from_force }
+        IntegratorNature { order: self.scheme.order, adaptive: false, dense: false, random: false, starts_from_force }
     }
 
     fn advance(&mut self, block: &mut Block) {
