@@ -49,8 +49,12 @@ impl DrivenField {
         potential.fill(0.0);
         field.fill(Vec3::zeros());
         for (c, waveform) in self.waveforms.iter().enumerate() {
+            // Grains that step together are all at one time.
+            let (mut time, mut volts) = (f64::NAN, 0.0);
             for p in 0..points.len() {
-                let volts = waveform.value(times[p]);
+                if times[p] != time {
+                    (time, volts) = (times[p], waveform.value(times[p]));
+                }
                 potential[p] += volts * scratch.potential[p * channels + c];
                 field[p] -= scratch.gradient[p * channels + c] * volts;
             }

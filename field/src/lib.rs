@@ -79,6 +79,7 @@ mod panel_groups;
 pub mod panel_sum;
 mod pieces;
 mod plane;
+pub mod quadratic;
 mod reduced;
 mod shown;
 pub mod source;
@@ -98,6 +99,7 @@ pub use linear_operator::LinearOperator;
 pub use panel::Panel;
 pub use panel_sum::PanelSum;
 pub use plane::Plane;
+pub use quadratic::{Quadratic, QuadraticField};
 pub use source::{Source, SourceKind};
 pub use table::{
     Grid, PotentialTable, TableError, TableOptions, TableReport, TabulatedField, starting_spacing, tabulate,

@@ -12,6 +12,7 @@ use crate::curved::CurvedSum;
 use crate::electrode_basis::{ElectrodeBasis, SurfaceCharge};
 use crate::panel_groups::{ON_SURFACE, PanelGroups};
 use crate::plane::Plane;
+use crate::quadratic::Quadratic;
 use crate::source::Source;
 use crate::{BasisField, Samples};
 
@@ -148,6 +149,21 @@ const BATCH: usize = 32;
 impl BasisField for PanelSum {
     fn channels(&self) -> usize {
         self.channels
+    }
+
+    fn quadratics(&self) -> Option<Vec<Quadratic>> {
+        // Without electrodes the field is that of the sources.
+        if !self.electrode_potential.is_empty() || self.ground.is_some() {
+            return None;
+        }
+        let mut channels = vec![Quadratic::default(); self.channels];
+        for (s, source) in self.sources.iter().enumerate() {
+            let form = source.quadratic()?;
+            for (c, channel) in channels.iter_mut().enumerate() {
+                channel.add(&form, self.source_weight[s * self.channels + c]);
+            }
+        }
+        Some(channels)
     }
 
     fn sample(&self, points: &[Vec3], samples: &mut Samples) {

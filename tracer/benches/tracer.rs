@@ -107,7 +107,7 @@ fn steps_far_from_surfaces(bencher: Bencher, method: Method) {
 /// Items: ordered pairs.
 #[divan::bench(args = [100, 1000, 4000])]
 fn coulomb_pairs(bencher: Bencher, count: usize) {
-    coulomb(bencher, count, |batch, force| Coulomb.add(batch, &mut Scratch::default(), force));
+    coulomb(bencher, count, |batch, force| Coulomb::default().add(batch, &mut Scratch::default(), force));
 }
 
 #[divan::bench(args = [1000])]

@@ -22,6 +22,8 @@ pub(crate) struct Block<'a> {
     pub seed: u64,
     /// Relative error a step may make.
     pub tolerance: f64,
+    /// Whether anything can end a flight on its way, so that `reach` is wanted.
+    pub watched: bool,
     /// Length below which motions need not be resolved relative to themselves, m.
     pub least_travel: f64,
 }
@@ -50,6 +52,10 @@ pub(crate) struct Trial {
     pub step: f64,
     /// s.
     pub end: f64,
+    /// Whether it is the first of even steps.
+    pub first: bool,
+    /// How many steps of length `step` it stands for.
+    pub steps: u64,
     /// Number of the step, for the random numbers.
     pub number: u64,
     /// At the end; the acceleration is that of the forces alone.
@@ -89,6 +95,7 @@ impl<'a> Block<'a> {
             trial: vec![Trial::default(); grains.len()],
             seed: 0,
             tolerance: 0.0,
+            watched: true,
             least_travel: 0.0,
         })
     }

@@ -38,7 +38,7 @@ pub struct Frame {
 }
 
 /// A grain in flight, with all that its next step depends on.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Flying {
     pub grain: usize,
     pub state: State,
@@ -51,6 +51,17 @@ pub(crate) struct Flying {
     pub anchor: Vec3,
     pub clear: f64,
     pub sampled: f64,
+    /// What the integrator remembers of its way.
+    pub memory: Vec<f64>,
+}
+
+impl Flying {
+    /// The same for grains that one block may carry on together: their time, and the first that the integrator remembers (which
+    /// is the same for all grains of a block).
+    pub fn moment(&self) -> [u64; 4] {
+        let known = |k: usize| self.memory.get(k).map_or(0, |x| x.to_bits());
+        [self.state.time.to_bits(), known(0), known(1), known(2)]
+    }
 }
 
 /// A grain whose flight is over.

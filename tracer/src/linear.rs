@@ -71,6 +71,12 @@ impl LinearFlow {
         self.times(v, self.along.decay, self.across.decay)
     }
 
+    /// Along the magnetic field, or anywhere without one: how far a grain of 1 m/s gets, s, and the part of its speed that is
+    /// left.
+    pub fn along(&self) -> (f64, f64) {
+        (self.along.shift, self.along.decay)
+    }
+
     /// `along` times the part along the axis and `across` times the part across it.
     fn times(&self, v: &Vec3, along: f64, across: Complex<f64>) -> Vec3 {
         times(&self.axis, v, along, across)

@@ -9,7 +9,8 @@ use crate::{Journal, Standing, TraceError};
 /// Which integrator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// `Langevin` when there is noise, else `Dop853`.
+    /// `Langevin` when there is noise; `BlanesMoan14`, with a step from the tolerance, in forces that are linear in the
+    /// position; else `Dop853`.
     #[default]
     Auto,
     /// Dormand and Prince's 8(5,3): order 8, adaptive, dense output of order 7. For any force without noise.
@@ -24,6 +25,12 @@ pub enum Method {
     BlanesMoan4,
     /// Blanes and Moan's composition of order 6 (eleven forces a step).
     BlanesMoan6,
+    /// Blanes and Moan's composition of order 6 with the smallest error (fourteen forces a step): in a Paul trap 1e-6 after 1000
+    /// periods takes 140 forces a period, where the one with eleven takes 176.
+    BlanesMoan14,
+    /// Störmer's multistep scheme of order 12: one force a step, dense output, for smooth forces without magnetic field. In a Paul
+    /// trap 1e-6 after 1000 periods takes 36 forces a period.
+    Stoermer12,
 }
 
 /// Called with the fraction that is done, from 0 to 1, at most about a thousand times, from any thread.

@@ -6,6 +6,7 @@ use field::DrivenField;
 use meshes::{SurfaceTree, Vec3};
 
 use crate::constants::BOLTZMANN;
+use crate::force::linear_form::LinearForm;
 use crate::force::{Batch, Force, Nature, Scratch};
 use crate::linear::Linear;
 use crate::{ConstantForce, Coulomb, Drag, DragError, Electric, Event, Gravity, Region};
@@ -58,9 +59,14 @@ impl System {
         self.with_force(ConstantForce { force })
     }
 
-    /// Adds the mutual force of the grains.
+    /// Adds the mutual force of the grains, every pair of them.
     pub fn with_coulomb(self) -> Self {
-        self.with_force(Coulomb)
+        self.with_force(Coulomb::default())
+    }
+
+    /// Adds the mutual force of the grains, for many of them to this accuracy ([`Coulomb::accuracy`]).
+    pub fn with_coulomb_to(self, accuracy: f64) -> Self {
+        self.with_force(Coulomb { accuracy: Some(accuracy) })
     }
 
     /// Sets the drag.
@@ -116,6 +122,14 @@ impl System {
         self.forces.iter().map(|f| f.next_corner(t)).fold(f64::INFINITY, f64::min)
     }
 
+    /// The sum of the forces as a linear function of position along each axis by itself, if it is one, and no magnetic field
+    /// mixes the axes.
+    pub(crate) fn linear_form(&self) -> Option<LinearForm> {
+        let forms: Option<Vec<LinearForm>> = self.forces.iter().map(|f| f.linear_form()).collect();
+        let sum = forms?.into_iter().fold(LinearForm::default(), LinearForm::plus);
+        (sum.is_diagonal() && self.magnetic_field == Vec3::zeros()).then_some(sum)
+    }
+
     /// Everything that ends flights, in a fixed order.
     pub(crate) fn all_events(&self) -> Vec<&dyn Event> {
         let surface = self.surface.as_deref().map(|s| s as &dyn Event);
@@ -159,7 +173,7 @@ impl System {
         out.fill(zero);
         for force in &self.forces {
             let force = force.as_ref();
-            if force.nature().couples_grains || batch.len() <= 2 * PART {
+            if batch.len() <= 2 * PART || force.nature().couples_grains {
                 add(force, batch, scratch, out);
             } else {
                 use rayon::prelude::*;

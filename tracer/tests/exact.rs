@@ -8,7 +8,7 @@ use tracer::{Drag, DragLaw, Gas, Method, Options, Outcome, Region, System};
 
 /// The methods that share the deterministic tests, with a step in units of the RF period (or none) and the error that
 /// the step gives on the Mathieu trajectories below, relative to the largest excursion.
-const METHODS: [(Method, Option<f64>, f64); 5] = [
+const METHODS: [(Method, Option<f64>, f64); 7] = [
     // A thousand steps of 1e-13.
     (Method::Dop853, None, 2e-11),
     // (Ω h)² / 24 in the phase of at most 60 rad, and twice that where the motion grows.
@@ -18,6 +18,9 @@ const METHODS: [(Method, Option<f64>, f64); 5] = [
     // second, a wrong coefficient in both.
     (Method::BlanesMoan4, Some(1.0 / 40.0), 1e-6),
     (Method::BlanesMoan6, Some(1.0 / 40.0), 1e-9),
+    // At 20 steps.
+    (Method::BlanesMoan14, Some(1.0 / 20.0), 2e-9),
+    (Method::Stoermer12, Some(1.0 / 60.0), 2e-9),
 ];
 
 #[test]
@@ -60,6 +63,38 @@ fn exact_mathieu_trajectories_at_the_default_tolerance() {
 }
 
 #[test]
+fn exact_default_in_linear_forces() {
+    // The default flies a quadratic field with the symplectic scheme of order 6, its step from the tolerance: after 31.8
+    // periods a tenth of the tolerance a period, at q = 0.2 to 0.8, with and without drag.
+    for case in cases("mathieu", "trajectory.") {
+        let (a, q, k) = (case.number("a"), case.number("q"), case.number("k"));
+        let form = field::QuadraticField::quadrupole(v(1.0, -1.0, 0.0), 1.0);
+        let system = tracer::System::new().with_field(rf(form, a, 2.0 * q, 2.0)).with_drag(Drag::Rate(2.0 * k));
+        let (zeta, u) = (case.list("zeta"), case.list("u"));
+        let size = u.iter().fold(case.number("u0").abs(), |m, u| m.max(u.abs()));
+        let last = zeta.len() - 1;
+        for tolerance in [1e-6, 1e-9, 1e-11] {
+            let options = Options { tolerance, estimate_error: true, duration: zeta[last], ..Options::default() };
+            let grains =
+                ensemble([grain(v(case.number("u0"), 0.0, 0.0), v(case.number("du0_dzeta"), 0.0, 0.0), 1.0, 1.0)]);
+            let traced = run(&system, &grains, &options);
+            assert_eq!(traced.method, Method::BlanesMoan14);
+            let error = (traced.ensemble.positions()[0].x - u[last]).abs();
+            // At q = 0.92, which is unstable, errors grow with the motion and a little faster: 2.2 times that.
+            let allowed = 0.1 * tolerance * zeta[last] / PI * if q > 0.9 { 3.0 } else { 1.0 };
+            assert!(error < allowed * size, "{} at {tolerance:e}: {:e}", case.id(), error / size);
+            let told = traced.error.unwrap().position;
+            // Half the step leaves a 64th of the error; below 1e-13 both are rounding.
+            assert!(
+                (told / error - 1.0).abs() < 0.3 || error.max(told) < 1e-12 * size,
+                "{}: {told:e} {error:e}",
+                case.id()
+            );
+        }
+    }
+}
+
+#[test]
 fn exact_mathieu_samples_between_steps() {
     // The dense output must be as good as the steps: at 1e-12 a step, 1e-9 of the exact values at times that no step meets.
     for case in cases("mathieu", "trajectory.a=0.q=0.4.k=0") {
@@ -80,6 +115,28 @@ fn exact_mathieu_samples_between_steps() {
             assert!((sample.potential_energy - 0.5 * drive * sample.position.x.powi(2)).abs() < 1e-14);
         }
     }
+}
+
+#[test]
+fn exact_samples_between_steps_of_a_multistep() {
+    // Quintics through the ends of steps: h⁶/46080 of the sixth derivative, 64 at twice the RF's phase, with h = π/60.
+    for case in cases("mathieu", "trajectory.a=0.q=0.4.k=0") {
+        let (zeta, u, du) = (case.list("zeta"), case.list("u"), case.list("du_dzeta"));
+        for n in 0..zeta.len() {
+            let step = Some(PI / 60.0);
+            let options = Options { every: Some(zeta[n] / 7.0), step, ..options(Method::Stoermer12, 1.3 * zeta[n]) };
+            let grains = ensemble([grain(v(1.0, 0.0, 0.0), v(0.0, 0.0, 0.0), 1.0, 1.0)]);
+            let (tracks, _) = samples(&mathieu(0.0, 0.4), &grains, &options);
+            assert_eq!(tracks[0].len(), 11, "0 to 9 sevenths and the end");
+            let sample = tracks[0][7];
+            assert!((sample.position.x - u[n]).abs() < 1e-9, "{:e}", sample.position.x - u[n]);
+            assert!((sample.velocity.x - du[n]).abs() < 1e-7, "{:e}", sample.velocity.x - du[n]);
+        }
+    }
+    let refused = System::new().with_magnetic_field(v(0.0, 0.0, 1.0));
+    let grains = ensemble([grain(v(1.0, 0.0, 0.0), v(0.0, 0.0, 0.0), 1.0, 1.0)]);
+    let error = tracer::trace(&refused, &grains, &options(Method::Stoermer12, 1.0), &tracer::Nothing).unwrap_err();
+    assert!(error.to_string().contains("there is a magnetic field"), "{error}");
 }
 
 #[test]
@@ -117,6 +174,54 @@ fn exact_half_trace_of_one_period() {
         assert!((half_trace - exact).abs() < 1e-11 * exact.abs().max(1.0), "{}: {half_trace} {exact}", case.id());
         assert!((m[0] * m[3] - m[1] * m[2] - 1.0).abs() < 1e-11, "area");
     }
+}
+
+#[test]
+fn exact_stability_by_floquet() {
+    use tracer::stability::mathieu_map;
+    for case in cases("mathieu", "beta.") {
+        let map = mathieu_map(&[case.number("a")], &[case.number("q")], 0.0);
+        let exact = case.number("half_trace_cos_pi_beta");
+        assert!((map.value[0] - exact).abs() < 1e-9 * exact.abs().max(1.0), "{}: {} {exact}", case.id(), map.value[0]);
+        assert_eq!(map.is_stable(0, 0), exact.abs() < 1.0);
+    }
+    // Limits with drag, by bisection: to the error of the half trace over its slope there, which is near one.
+    for case in cases("mathieu", "damped_limit.") {
+        let (a, k, exact) = (case.number("a"), case.number("k"), case.number("q_max"));
+        let (mut low, mut high) = (0.9 * exact, 1.05 * exact);
+        while high - low > 1e-11 {
+            let middle = 0.5 * (low + high);
+            if mathieu_map(&[a], &[middle], k).is_stable(0, 0) { low = middle } else { high = middle }
+        }
+        assert!((low - exact).abs() < 1e-8, "{}: {low} {exact}", case.id());
+    }
+}
+
+#[test]
+fn exact_stability_by_flights() {
+    use tracer::stability::{mathieu_map, mathieu_map_by_flights};
+    // The first region and its surroundings, 200 x 200: the two maps differ where the half trace is so close to one that a
+    // hundred periods do not tell, which is along the limits.
+    let a: Vec<f64> = (0..200).map(|i| -0.2 + 0.0035 * f64::from(i)).collect();
+    let q: Vec<f64> = (0..200).map(|j| 0.005 * (0.5 + f64::from(j))).collect();
+    let exact = mathieu_map(&a, &q, 0.0);
+    let flown = mathieu_map_by_flights(&a, &q, 100, 1e2);
+    let (mut differ, mut stable) = (0, 0);
+    for i in 0..200 {
+        for j in 0..200 {
+            stable += usize::from(exact.is_stable(i, j));
+            if exact.is_stable(i, j) != flown.is_stable(i, j) {
+                differ += 1;
+                // Growth e^(μ π) a period with cosh(μ π) the half trace: e^5 in 100 periods takes 1e-3 above one.
+                let excess = exact.value[i * 200 + j].abs() - 1.0;
+                assert!((-1e-4..3e-3).contains(&excess), "a = {}, q = {}: {excess}", a[i], q[j]);
+            }
+        }
+    }
+    assert!(stable > 5000 && differ < 400, "{differ} differ, {stable} of 40000 are stable");
+    // The tip of the region along a = 0, as it stands in the tables.
+    let tip = mathieu_map(&[0.0], &[0.90804, 0.90805], 0.0);
+    assert!(tip.is_stable(0, 0) && !tip.is_stable(0, 1));
 }
 
 #[test]
@@ -278,9 +383,12 @@ fn exact_two_grains_collide_as_kepler_says() {
     let grains =
         ensemble([grain(r0 * 0.5, u0 * 0.5 + drift, charge, mass), grain(-r0 * 0.5, -u0 * 0.5 + drift, charge, mass)]);
     let system = System::new().with_coulomb();
-    for (method, steps, allowed) in
-        [(Method::Dop853, 1.0, 1e-10), (Method::Verlet, 2e4, 1e-5), (Method::BlanesMoan6, 2e3, 1e-8)]
-    {
+    for (method, steps, allowed) in [
+        (Method::Dop853, 1.0, 1e-10),
+        (Method::Verlet, 2e4, 1e-5),
+        (Method::BlanesMoan6, 2e3, 1e-8),
+        (Method::Stoermer12, 4e3, 1e-8),
+    ] {
         let options = Options { step: Some(time / steps), ..options(method, time) };
         let traced = run(&system, &grains, &options);
         let (p, w) = (traced.ensemble.positions(), traced.ensemble.velocities());

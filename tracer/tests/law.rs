@@ -7,13 +7,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use common::*;
+use field::{BasisField, DrivenField, Quadratic, QuadraticField, Samples, Waveform, WaveformPart};
 use meshes::Vec3;
 use tracer::constants::BOLTZMANN;
 use tracer::{
     Drag, Ensemble, Group, Launch, Method, Nothing, Options, Outcome, Place, Region, Sink, System, TraceError, trace,
 };
 
-const SYMPLECTIC: [Method; 4] = [Method::Verlet, Method::Boris, Method::BlanesMoan4, Method::BlanesMoan6];
+const SYMPLECTIC: [Method; 5] =
+    [Method::Verlet, Method::Boris, Method::BlanesMoan4, Method::BlanesMoan6, Method::BlanesMoan14];
 
 /// Change of the mean energy from the first half of a flight to the second, weighted with Hann windows, so that its
 /// wiggles during an oscillation do not show as drift.
@@ -40,6 +42,9 @@ fn law_energy_in_a_static_field() {
         // Rounding: 2e-14.
         (Method::BlanesMoan4, 0.02, 1e-12),
         (Method::BlanesMoan6, 0.02, 1e-12),
+        (Method::BlanesMoan14, 0.02, 1e-12),
+        // Rounding of the multistep, which adds up: 4e-13.
+        (Method::Stoermer12, 0.02, 5e-12),
         // Adaptive and not symplectic: 1e-13 a step over some thousand steps; measured 2e-13.
         (Method::Dop853, 0.02, 1e-11),
     ] {
@@ -144,7 +149,8 @@ fn law_momentum_and_energy_of_a_cloud() {
     let momentum = |g: &Ensemble| g.velocities().iter().sum::<Vec3>() * 1e-13;
     let free = System::new().with_coulomb();
     let size = 40.0 * 1e-13 * 0.1;
-    for (method, step) in [(Method::Dop853, None), (Method::BlanesMoan6, Some(2e-5))] {
+    for (method, step) in [(Method::Dop853, None), (Method::BlanesMoan6, Some(2e-5)), (Method::Stoermer12, Some(5e-6))]
+    {
         let options = Options { step, tolerance: 1e-11, ..options(method, 0.01) };
         let traced = run(&free, &grains, &options);
         // Every pair's forces cancel but for the rounding of the sums.
@@ -249,6 +255,101 @@ fn mixed(count: usize) -> (System, Ensemble) {
     (system, grains)
 }
 
+/// A field that does not say that it is quadratic.
+struct Hidden(QuadraticField);
+
+impl BasisField for Hidden {
+    fn channels(&self) -> usize {
+        self.0.channels()
+    }
+
+    fn sample(&self, points: &[Vec3], samples: &mut Samples) {
+        self.0.sample(points, samples);
+    }
+}
+
+/// A quadrupole under RF, a uniform field that turns on, gravity and a constant force, in a region, with or without drag.
+fn linear(hidden: bool, rate: f64, pushed: bool) -> System {
+    let mut channels = vec![Quadratic::quadrupole(v(1.0, 1.0, -2.0), 1.0)];
+    let sine = WaveformPart::Sine { amplitude: -0.45, frequency: 1.0 / PI, phase: 0.3 };
+    let mut waveforms = vec![Waveform { constant: 0.02, parts: vec![sine] }];
+    let mut system = System::new().with_drag(Drag::Rate(rate));
+    if pushed {
+        channels.push(Quadratic::uniform(v(0.3, -0.1, 0.2)));
+        let ramp = WaveformPart::Ramp { amplitude: 0.01, start: 5.0, duration: 7.0 };
+        waveforms.push(Waveform { constant: 0.0, parts: vec![ramp] });
+        system = system.with_gravity(v(0.001, 0.002, -0.003)).with_constant_force(v(1e-15, 0.0, -2e-15));
+    }
+    let field = QuadraticField { channels };
+    let basis: Arc<dyn BasisField> = if hidden { Arc::new(Hidden(field)) } else { Arc::new(field) };
+    system.with_field(DrivenField::new(basis, waveforms))
+}
+
+const SPLIT: [Method; 4] = [Method::Verlet, Method::BlanesMoan4, Method::BlanesMoan6, Method::BlanesMoan14];
+
+#[test]
+fn law_linear_forces_fly_as_others_do() {
+    // The same schemes, coded apart, a point at a time: rounding of 30 steps a period over ten periods, grown with the motion.
+    let (with_region, mut grains) = mixed(60);
+    grains.push(grain(v(0.1, 0.2, 0.3), v(0.02, 0.0, -0.03), 0.0, 1e-12)).unwrap();
+    for (rate, pushed) in [(0.0, false), (0.3, false), (0.0, true), (0.3, true)] {
+        for method in SPLIT {
+            for every in [None, Some(1.7)] {
+                let options = Options { step: Some(0.1), every, ..options(method, 30.0) };
+                let [one, other] = [false, true].map(|hidden| {
+                    let system = System { region: with_region.region, ..linear(hidden, rate, pushed) };
+                    (run(&system, &grains, &options), samples(&system, &grains, &options).0)
+                });
+                assert_eq!(one.0.accepted, other.0.accepted, "{method:?}: every grain takes the same steps");
+                let mut left = 0;
+                for k in 0..grains.len() {
+                    let (a, b) = (&one.0.endings[k], &other.0.endings[k]);
+                    assert_eq!(std::mem::discriminant(&a.outcome), std::mem::discriminant(&b.outcome));
+                    assert!((a.time - b.time).abs() < 1e-11, "{method:?}: {} {}", a.time, b.time);
+                    let off = one.0.ensemble.positions()[k] - other.0.ensemble.positions()[k];
+                    assert!(off.norm() < 1e-12, "{method:?} grain {k}: {off}");
+                    left += usize::from(matches!(a.outcome, Outcome::LeftRegion { .. }));
+                    assert_eq!(one.1[k].len(), other.1[k].len());
+                    for (a, b) in one.1[k].iter().zip(&other.1[k]) {
+                        assert!((a.position - b.position).norm() + (a.velocity - b.velocity).norm() < 1e-12);
+                    }
+                }
+                assert!(left > 5 && left < grains.len(), "{left} have left the region");
+            }
+        }
+    }
+}
+
+#[test]
+fn law_linear_forces_give_the_same_bits_for_any_threads_and_blocks() {
+    let (with_region, grains) = mixed(70);
+    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    for (rate, pushed) in [(0.0, false), (0.3, true)] {
+        let system = System { region: with_region.region, ..linear(false, rate, pushed) };
+        for method in SPLIT {
+            let options = Options { step: Some(0.1), ..options(method, 30.0) };
+            let fly = |threads: usize, block: usize, every: Option<f64>, grains: &Ensemble| {
+                let options = Options { block, every, ..options.clone() };
+                pool(threads).install(|| run(&system, grains, &options))
+            };
+            let one = fly(1, 64, None, &grains);
+            for (threads, block) in [(2, 64), (2, 3), (1, 1)] {
+                assert!(fly(threads, block, None, &grains) == one, "{method:?}, {threads} threads, blocks of {block}");
+            }
+            for k in [0, 7, 41] {
+                assert_eq!(fly(1, 64, None, &grains.subset(&[k])).ensemble.grain(0), one.ensemble.grain(k));
+            }
+            // Samples at ends of steps cut what is flown at once, and change nothing.
+            let sampled = fly(1, 64, Some(1.5), &grains);
+            for k in (0..grains.len()).filter(|&k| one.endings[k].outcome == Outcome::TimeUp) {
+                let off = sampled.ensemble.positions()[k] - one.ensemble.positions()[k];
+                // The ends of steps are counted from the samples: rounding of times.
+                assert!(off.norm() < 1e-12, "{method:?}: {off}");
+            }
+        }
+    }
+}
+
 #[test]
 fn law_same_bits_for_any_threads_and_blocks() {
     let (plain, grains) = mixed(100);
@@ -259,10 +360,13 @@ fn law_same_bits_for_any_threads_and_blocks() {
     for (system, method, grains) in [
         (&plain, Method::Dop853, &grains),
         (&plain, Method::BlanesMoan4, &grains),
+        (&plain, Method::BlanesMoan14, &grains),
+        (&plain, Method::Stoermer12, &grains),
         (&plain, Method::Boris, &grains),
         (&noisy, Method::Langevin, &grains),
         (&coupled, Method::Dop853, &few),
         (&coupled, Method::Verlet, &few),
+        (&coupled, Method::Stoermer12, &few),
     ] {
         let options = Options { tolerance: 1e-8, step: Some(0.05), every: Some(0.7), ..options(method, 30.0) };
         let fly = |threads: usize, block: usize, grains: &Ensemble| {

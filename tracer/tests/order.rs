@@ -113,6 +113,35 @@ fn order_blanes_moan_6() {
 }
 
 #[test]
+fn order_blanes_moan_14() {
+    check(Method::BlanesMoan14, &[15.0, 30.0, 60.0, 120.0]);
+}
+
+#[test]
+fn order_stoermer() {
+    // Mathieu flights of many periods, damped or not, at 26 to 45 steps a period: finer, the steps of order 6 that it starts
+    // with show, and then rounding.
+    for (q, k) in [(0.4, 0.0), (0.4, 0.05), (0.7, 0.0)] {
+        let system = mathieu(0.05, q).with_drag(Drag::Rate(2.0 * k));
+        let start = (v(1.0, 0.4, 0.0), v(0.3, -0.2, 0.1));
+        let time = 40.0 * std::f64::consts::PI;
+        let best = end(&system, start.0, start.1, &options(Method::Dop853, time));
+        let (mut steps, mut errors) = (Vec::new(), Vec::new());
+        for n in [26.0, 32.0, 38.0, 45.0] {
+            let h = std::f64::consts::PI / n;
+            let (r, u) =
+                end(&system, start.0, start.1, &Options { step: Some(h), ..options(Method::Stoermer12, time) });
+            steps.push(h);
+            errors.push((r - best.0).norm() + (u - best.1).norm());
+        }
+        let slope = (errors[0] / errors[3]).ln() / (steps[0] / steps[3]).ln();
+        // Two terms of the error, of orders 12 and 13, add or cancel.
+        assert!((11.0..16.0).contains(&slope), "q = {q}, k = {k}: {slope}, {errors:?}");
+        assert!(errors[3] < 3e-8, "{errors:?}");
+    }
+}
+
+#[test]
 fn order_dop853() {
     // A loose tolerance accepts every step at its longest; the few shorter ones at the start, while the control lets steps
     // grow, move the slope a little, and so does the next term, only h smaller: half.
@@ -161,7 +190,15 @@ fn order_is_kept_across_corners_of_a_waveform() {
         u += a * h;
         t = next;
     }
-    for method in [Method::Dop853, Method::Verlet, Method::Boris, Method::BlanesMoan4, Method::BlanesMoan6] {
+    for method in [
+        Method::Dop853,
+        Method::Verlet,
+        Method::Boris,
+        Method::BlanesMoan4,
+        Method::BlanesMoan6,
+        Method::BlanesMoan14,
+        Method::Stoermer12,
+    ] {
         let options = Options { step: Some(0.3), ..options(method, 20.0) };
         let (r, w) = end(&system, v(0.0, 0.0, 0.0), v(0.0, 0.0, 0.0), &options);
         // Rounding of some hundred steps.

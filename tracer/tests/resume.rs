@@ -72,6 +72,8 @@ fn law_resumed_flights_end_with_the_same_bits() {
     for (name, system, method) in [
         ("adaptive", &alone, Method::Dop853),
         ("symplectic", &alone, Method::BlanesMoan6),
+        ("multistep", &alone, Method::Stoermer12),
+        ("coupled, multistep", &coupled, Method::Stoermer12),
         ("noise", &noisy, Method::Langevin),
         ("coupled", &coupled, Method::Dop853),
         ("coupled, fixed steps", &coupled, Method::Verlet),

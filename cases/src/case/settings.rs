@@ -83,6 +83,8 @@ pub struct Forces {
     pub coulomb: bool,
     /// Grains feel the charges that they all induce on the electrodes.
     pub image_charge: bool,
+    /// Relative error that this may have with many grains; `None`: that of the trajectories.
+    pub coulomb_accuracy: Option<f64>,
     /// T.
     pub magnetic_field: Vec3,
     /// Temperature of the random kicks of the gas, K; then there is a drag.

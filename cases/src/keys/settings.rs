@@ -98,6 +98,9 @@ pub(crate) struct ForceKeys {
     pub coulomb: Option<bool>,
     /// Whether grains feel the charges that they all induce on the electrodes; left out: they do not.
     pub image_charge: Option<bool>,
+    /// Relative error that the repulsion of some thousand grains and more may have; fewer are summed pair by pair. Left out:
+    /// that of `trace.accuracy`.
+    pub coulomb_accuracy: Option<Fraction>,
     /// Magnetic field; left out: none.
     pub magnetic_field: Option<Vector<MagneticField>>,
     /// Temperature of the random kicks of the gas (needs `drag`); left out: no kicks.

@@ -156,7 +156,11 @@ pub fn system(
         .with_magnetic_field(case.forces.magnetic_field)
         .with_region(region);
     if case.forces.coulomb {
-        system = system.with_coulomb();
+        let accuracy = case.forces.coulomb_accuracy.or(case.trace.as_ref().map(|settings| settings.accuracy));
+        system = match accuracy {
+            Some(accuracy) => system.with_coulomb_to(accuracy),
+            None => system.with_coulomb(),
+        };
     }
     if let Some(induction) = induction {
         system = system.with_force(ImageCharge { induction });

@@ -98,9 +98,10 @@ pub(super) fn forces(at: &At, keys: &ForceKeys, grains: &[GrainGroup]) -> Result
         drag: drag(at, keys, grains)?,
         gravity: vector(keys.gravity.as_ref().map(Vector::si)),
         constant: vector(keys.constant.as_ref().map(Vector::si)),
-        // No force acts unless the case names it, this one included: it also costs the square of the number of grains.
+        // No force acts unless the case names it, this one included: it also makes all grains step together.
         coulomb: keys.coulomb.unwrap_or(false),
         image_charge: keys.image_charge.unwrap_or(false),
+        coulomb_accuracy: keys.coulomb_accuracy.map(|accuracy| accuracy.value),
         magnetic_field: vector(keys.magnetic_field.as_ref().map(Vector::si)),
         langevin: keys.langevin.map(|temperature| temperature.value),
     };

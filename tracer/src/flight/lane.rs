@@ -91,7 +91,12 @@ impl Grid {
     }
 
     pub fn next_end(&self) -> f64 {
-        let next = self.taken + 1;
+        self.end_after(1)
+    }
+
+    /// Where the grid is after so many more steps.
+    pub fn end_after(&self, steps: u64) -> f64 {
+        let next = self.taken + steps;
         if next == self.count { self.stop } else { self.start + next as f64 * self.step }
     }
 }

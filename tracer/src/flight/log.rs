@@ -53,7 +53,8 @@ impl<I: Integrator> Loop<'_, '_, I> {
             self.record(lane);
         }
         let counts = Counts { evaluations: self.block.forces.evaluations, ..self.result.counts };
-        let flying = self.lanes.iter().zip(&self.block.state).map(|(l, state)| Flying {
+        let memory = self.integrator.memory(self.lanes.len());
+        let flying = self.lanes.iter().zip(&self.block.state).zip(memory).map(|((l, state), memory)| Flying {
             grain: l.grain,
             state: *state,
             corner: l.corner,
@@ -65,6 +66,7 @@ impl<I: Integrator> Loop<'_, '_, I> {
             anchor: l.anchor,
             clear: l.clear,
             sampled: l.sampled,
+            memory,
         });
         let frame = Frame {
             flying: flying.collect(),

@@ -14,6 +14,7 @@ use self::sampling::Point;
 use crate::block::{Block, State, retain};
 use crate::checkpoint::{Counts, Landed};
 use crate::event::first_event;
+use crate::force::linear_form::LinearForm;
 use crate::integrator::{Integrator, IntegratorNature};
 use crate::linear::Linear;
 use crate::path::Path;
@@ -36,6 +37,8 @@ pub(crate) struct Run<'a> {
     pub least_travel: f64,
     /// All grains step together.
     pub shared: bool,
+    /// The forces, where they are linear in the position.
+    pub linear: Option<LinearForm>,
 }
 
 /// What came of a block.
@@ -53,6 +56,10 @@ pub(crate) const LEAST_TRAVEL: f64 = 1e-3;
 /// costs 200 µs, because all panels are about as far; to learn that none is within 32 steps costs 1 µs, every 32 steps.
 const LOOK_AHEAD: f64 = 32.0;
 
+/// Most steps that are tried at once: their coefficients (fifteen kicks of 72 bytes each) stay in the first cache, and what the
+/// loop does between them no longer shows.
+const LONGEST_LEAP: u64 = 32;
+
 /// Rounds between looks at the progress meter.
 const ROUNDS: u64 = 16;
 
@@ -68,14 +75,17 @@ pub(crate) struct Loop<'a, 'b, I> {
     path_lanes: Vec<usize>,
     points: Vec<Point>,
     log: Log,
+    /// Steps to try at once.
+    leap: u64,
 }
 
 impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
-    pub fn new(run: &'b Run<'a>, integrator: I, grains: &[usize]) -> Result<Self, TraceError> {
+    pub fn new(run: &'b Run<'a>, mut integrator: I, grains: &[usize]) -> Result<Self, TraceError> {
         let mut block = Block::new(run.system, run.ensemble, grains)?;
         block.seed = run.options.seed;
         block.tolerance = run.options.tolerance;
         block.least_travel = run.least_travel;
+        block.watched = !run.events.is_empty();
         let start = run.options.start;
         let margin = block.forces.margin(start, start);
         let lanes = grains.iter().enumerate().map(|(lane, &grain)| {
@@ -100,7 +110,12 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
                 fate: None,
             }
         });
-        let lanes = lanes.collect();
+        let lanes: Vec<Lane> = lanes.collect();
+        let known = |lane: &Lane| Some(run.options.resume.as_ref()?.flying.get(&lane.grain)?.memory.as_slice());
+        let memory: Vec<&[f64]> = lanes.iter().filter_map(known).collect();
+        if memory.len() == lanes.len() && memory.iter().all(|numbers| !numbers.is_empty()) {
+            integrator.remember(&block, &memory);
+        }
         Ok(Self {
             run,
             nature: integrator.nature(),
@@ -112,6 +127,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
             path_lanes: Vec::new(),
             points: Vec::new(),
             log: Log::new(),
+            leap: LONGEST_LEAP,
         })
     }
 
@@ -128,7 +144,9 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
                 break;
             }
             self.plan();
-            self.integrator.advance(&mut self.block);
+            if !self.leap() {
+                self.integrator.advance(&mut self.block);
+            }
             self.judge()?;
             rounds += 1;
             if rounds.is_multiple_of(ROUNDS) || self.lanes.is_empty() {
@@ -229,14 +247,39 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
                 (end - state.time, end)
             } else {
                 if l.grid.taken == l.grid.count {
-                    let stop = self.run.options.end().min(l.corner).min(self.run.sample_time(l.sample));
+                    let sample = if self.nature.dense { f64::INFINITY } else { self.run.sample_time(l.sample) };
+                    let stop = self.run.options.end().min(l.corner).min(sample);
                     l.grid = Grid::new(state.time, stop, self.run.step.min(self.run.max_step));
                 }
                 (l.grid.step, l.grid.next_end())
             };
             let trial = &mut self.block.trial[lane];
             (trial.step, trial.end, trial.number, trial.error) = (step, end, l.number, 0.0);
+            (trial.steps, trial.first) = (1, l.grid.taken == 0);
         }
+    }
+
+    /// Tries many steps at once, if the integrator can and nothing comes near any grain meanwhile; what they did is then in
+    /// the trials, as one step.
+    fn leap(&mut self) -> bool {
+        let Some(first) = self.lanes.first().filter(|_| !self.run.shared && !self.nature.adaptive) else {
+            return false;
+        };
+        let (grid, steps) = (first.grid, self.leap.min(first.grid.count - first.grid.taken));
+        if steps < 2 {
+            self.leap = (2 * self.leap).min(LONGEST_LEAP);
+            return false;
+        }
+        let (planned, evaluations) = (self.block.trial.clone(), self.block.forces.evaluations);
+        let ends: Vec<f64> = (1..=steps).map(|k| grid.end_after(k)).collect();
+        let done = self.integrator.leap(&mut self.block, &ends);
+        let clear = done && (0..self.lanes.len()).all(|lane| self.is_finite(lane) && !self.may_meet(lane));
+        self.leap = if clear { (2 * self.leap).min(LONGEST_LEAP) } else { (self.leap / 4).max(1) };
+        if !clear {
+            self.block.trial = planned;
+            self.block.forces.evaluations = evaluations;
+        }
+        clear
     }
 
     /// Accepts or rejects what was tried, looks for events, takes samples.
@@ -376,7 +419,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
         let mut all = false;
         for lane in (0..self.lanes.len()).filter(|&lane| good[lane]) {
             let sampled =
-                self.nature.adaptive && self.run.sample_time(self.lanes[lane].sample) < self.block.trial[lane].end;
+                self.nature.dense && self.run.sample_time(self.lanes[lane].sample) < self.block.trial[lane].end;
             let met = self.lanes[lane].fate.is_none() && self.may_meet(lane);
             if sampled || met {
                 self.path_lanes.push(lane);
@@ -402,8 +445,8 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
             return false;
         }
         l.anchor = from;
-        let distances = self.run.events.iter().map(|event| event.distance(&from, LOOK_AHEAD * reach));
-        l.clear = distances.fold(LOOK_AHEAD * reach, f64::min);
+        let look = reach * (LOOK_AHEAD / self.block.trial[lane].steps as f64).max(2.0);
+        l.clear = self.run.events.iter().map(|event| event.distance(&from, look)).fold(look, f64::min);
         reach >= l.clear
     }
 
@@ -475,18 +518,18 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
 
     /// Makes the end of the step the new state.
     fn commit(&mut self, lane: usize) {
-        self.result.counts.accepted += 1;
+        self.result.counts.accepted += self.block.trial[lane].steps;
         let (run, trial) = (self.run, self.block.trial[lane]);
         let (state, l) = (&mut self.block.state[lane], &mut self.lanes[lane]);
         run.meter.add(trial.end - state.time);
         state.time = trial.end;
         state.motion = trial.motion;
         state.fresh = trial.fresh;
-        state.travel = state.travel.max((trial.motion.position - state.origin).norm());
-        state.top_speed = state.top_speed.max(trial.motion.velocity.norm());
-        l.number += 1;
-        l.grid.taken = (l.grid.taken + 1).min(l.grid.count);
+        l.number += trial.steps;
+        l.grid.taken = (l.grid.taken + trial.steps).min(l.grid.count);
         if self.nature.adaptive {
+            state.travel = state.travel.max((trial.motion.position - state.origin).norm());
+            state.top_speed = state.top_speed.max(trial.motion.velocity.norm());
             let factor = if l.rejected { grow(trial.error).min(1.0) } else { grow(trial.error) };
             // A step cut short by a stop says nothing against the longer one that was wanted.
             let cut = factor >= 1.0 && trial.step < 0.99 * l.wanted.min(run.max_step);
@@ -536,6 +579,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
             self.result.landed.push(landed);
         }
         self.block.retain(&keep);
+        self.integrator.retain(&keep, self.run.shared);
         retain(&mut self.lanes, &keep);
         if self.run.shared {
             // The others no longer feel those that have ended.

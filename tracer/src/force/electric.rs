@@ -3,6 +3,7 @@
 use field::DrivenField;
 use meshes::Vec3;
 
+use super::linear_form::{LinearChannel, LinearForm};
 use super::{Batch, Force, Nature, Scratch};
 
 /// F = Q E(r, t) of a driven field.
@@ -41,6 +42,16 @@ impl Force for Electric {
         for (i, w) in energy.iter_mut().enumerate() {
             *w += scratch.scalar[i] * batch.charge[i];
         }
+    }
+
+    fn linear_form(&self) -> Option<LinearForm> {
+        let forms = self.field.basis().quadratics()?;
+        let channels = forms.into_iter().zip(self.field.waveforms()).map(|(form, waveform)| LinearChannel {
+            waveform: waveform.clone(),
+            field: -form.gradient,
+            hessian: form.hessian,
+        });
+        Some(LinearForm { channels: channels.collect(), ..LinearForm::default() })
     }
 
     fn next_corner(&self, t: f64) -> f64 {

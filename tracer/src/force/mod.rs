@@ -3,10 +3,13 @@
 pub mod coulomb;
 pub mod electric;
 pub mod image_charge;
+pub mod linear_form;
 pub mod uniform;
 
 use field::Samples;
 use meshes::Vec3;
+
+use self::linear_form::LinearForm;
 
 /// Grains as a force sees them: one entry for each, every grain at a time of its own.
 #[derive(Clone, Copy, Debug)]
@@ -84,6 +87,11 @@ pub trait Force: Send + Sync {
     /// is shared evenly by the two, so that the sum over grains is the energy of the whole.
     fn add_energy(&self, _batch: &Batch, _scratch: &mut Scratch, _energy: &mut [f64]) {}
 
+    /// The force as a linear function of position, if it is one everywhere. It gives what [`Force::add`] gives, to rounding.
+    fn linear_form(&self) -> Option<LinearForm> {
+        None
+    }
+
     /// The first time after `t` (s) at which the force is not smooth in time, or infinity.
     fn next_corner(&self, _t: f64) -> f64 {
         f64::INFINITY
@@ -99,4 +107,6 @@ pub struct Scratch {
     pub scalar: Vec<f64>,
     /// One vector for each grain.
     pub vector: Vec<Vec3>,
+    /// Any numbers.
+    pub numbers: Vec<f64>,
 }

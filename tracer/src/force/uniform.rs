@@ -2,6 +2,7 @@
 
 use meshes::Vec3;
 
+use super::linear_form::LinearForm;
 use super::{Batch, Force, Scratch};
 
 /// F = m g.
@@ -23,6 +24,10 @@ impl Force for Gravity {
             *w -= batch.mass[i] * self.acceleration.dot(&batch.position[i]);
         }
     }
+
+    fn linear_form(&self) -> Option<LinearForm> {
+        Some(LinearForm { acceleration: self.acceleration, ..LinearForm::default() })
+    }
 }
 
 /// The same force on every grain.
@@ -43,5 +48,9 @@ impl Force for ConstantForce {
         for (w, r) in energy.iter_mut().zip(batch.position) {
             *w -= self.force.dot(r);
         }
+    }
+
+    fn linear_form(&self) -> Option<LinearForm> {
+        Some(LinearForm { force: self.force, ..LinearForm::default() })
     }
 }

@@ -32,7 +32,7 @@ impl Boris {
 
 impl Integrator for Boris {
     fn nature(&self) -> IntegratorNature {
-        IntegratorNature { order: 2, adaptive: false, random: false, starts_from_force: false }
+        IntegratorNature { order: 2, adaptive: false, dense: false, random: false, starts_from_force: false }
     }
 
     fn advance(&mut self, block: &mut Block) {

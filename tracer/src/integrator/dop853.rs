@@ -94,7 +94,7 @@ fn combine(weights: &[(usize, f64)], k: &[Vec<f64>], out: &mut [f64]) {
 
 impl Integrator for Dop853 {
     fn nature(&self) -> IntegratorNature {
-        IntegratorNature { order: 8, adaptive: true, random: false, starts_from_force: true }
+        IntegratorNature { order: 8, adaptive: true, dense: true, random: false, starts_from_force: true }
     }
 
     fn advance(&mut self, block: &mut Block) {

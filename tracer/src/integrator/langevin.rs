@@ -43,7 +43,7 @@ impl Langevin {
 
 impl Integrator for Langevin {
     fn nature(&self) -> IntegratorNature {
-        IntegratorNature { order: 2, adaptive: false, random: true, starts_from_force: true }
+        IntegratorNature { order: 2, adaptive: false, dense: false, random: true, starts_from_force: true }
     }
 
     fn advance(&mut self, block: &mut Block) {

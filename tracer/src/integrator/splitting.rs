@@ -2,68 +2,11 @@
 
 use meshes::Vec3;
 
+use super::scheme::Scheme;
 use super::{Integrator, IntegratorNature};
 use crate::block::Block;
 use crate::linear::{Linear, LinearFlow};
-use crate::path::Path;
-
-/// How kicks and flights alternate: the step begins and ends with a kick, and reads the same backwards.
-#[derive(Debug, PartialEq)]
-pub(crate) struct Scheme {
-    pub order: u32,
-    /// Parts of the step, up to and including the middle one: kicks.
-    kicks: &'static [f64],
-    /// Parts of the step, up to and including the middle one: flights.
-    flights: &'static [f64],
-    /// Whether the middle one is a kick (else a flight).
-    middle_kick: bool,
-}
-
-/// Störmer's, Verlet's (1967) or leapfrog scheme: order 2.
-pub(crate) const VERLET: Scheme = Scheme { order: 2, kicks: &[0.5], flights: &[1.0], middle_kick: false };
-
-/// SRKN6b of Blanes and Moan, "Practical symplectic partitioned Runge-Kutta and Runge-Kutta-Nyström methods",
-/// J. Comput. Appl. Math. 142 (2002) 313, table 3. The last ones of the paper's are fixed by the sum being one.
-/// Checked by `order_blanes_moan_4`.
-pub(crate) const BLANES_MOAN_4: Scheme = {
-    const B: [f64; 3] = [0.0829844064174052, 0.396309801498368, -0.0390563049223486];
-    const A: [f64; 2] = [0.245298957184271, 0.604872665711080];
-    Scheme {
-        order: 4,
-        kicks: &[B[0], B[1], B[2], 1.0 - 2.0 * (B[0] + B[1] + B[2])],
-        flights: &[A[0], A[1], 0.5 - (A[0] + A[1])],
-        middle_kick: true,
-    }
-};
-
-/// SRKN11b of the same paper and table. Checked by `order_blanes_moan_6`.
-pub(crate) const BLANES_MOAN_6: Scheme = {
-    const B: [f64; 5] =
-        [0.0414649985182624, 0.198128671918067, -0.0400061921041533, 0.0752539843015807, -0.0115113874206879];
-    const A: [f64; 5] =
-        [0.123229775946271, 0.290553797799558, -0.127049212625417, -0.246331761062075, 0.357208872795928];
-    Scheme {
-        order: 6,
-        kicks: &[B[0], B[1], B[2], B[3], B[4], 0.5 - (B[0] + B[1] + B[2] + B[3] + B[4])],
-        flights: &[A[0], A[1], A[2], A[3], A[4], 1.0 - 2.0 * (A[0] + A[1] + A[2] + A[3] + A[4])],
-        middle_kick: false,
-    }
-};
-
-impl Scheme {
-    fn stages(&self) -> usize {
-        if self.middle_kick { 2 * self.flights.len() } else { 2 * self.flights.len() - 1 }
-    }
-
-    /// Which entry of `flights` the n-th flight is.
-    fn flight_index(&self, n: usize) -> usize {
-        n.min(self.stages() - 1 - n)
-    }
-
-    fn kick(&self, n: usize) -> f64 {
-        self.kicks[n.min(self.stages() - n)]
-    }
-}
+use crate::path::{Motion, Path};
 
 /// Kicks by the forces between exact flights with drag and magnetic field ([`LinearFlow`]).
 ///
@@ -79,6 +22,7 @@ pub(crate) struct Splitting {
     velocity: Vec<Vec3>,
     time: Vec<f64>,
     acceleration: Vec<Vec3>,
+    /// Square of the strongest acceleration of the step, m²/s⁴.
     strongest: Vec<f64>,
     flows: Vec<Flows>,
 }
@@ -102,11 +46,33 @@ impl Splitting {
             flows: Vec::new(),
         }
     }
+
+    /// Kicks all grains.
+    fn kick(&mut self, block: &Block, part: f64) {
+        for (lane, v) in self.velocity.iter_mut().enumerate() {
+            *v += self.acceleration[lane] * (part * block.trial[lane].step);
+        }
+    }
+
+    /// Flies all grains over the n-th flight of the step.
+    fn fly(&mut self, block: &Block, n: usize) {
+        let (part, which) = (self.scheme.flight(n), self.scheme.length_of(n));
+        for lane in 0..block.len() {
+            let (r, v) = (&mut self.position[lane], &mut self.velocity[lane]);
+            if block.linear[lane].is_free() {
+                *r += *v * (part * block.trial[lane].step);
+            } else {
+                self.flows[lane].flows[which].apply(r, v);
+            }
+            self.time[lane] += part * block.trial[lane].step;
+        }
+    }
 }
 
 impl Integrator for Splitting {
     fn nature(&self) -> IntegratorNature {
-        IntegratorNature { order: self.scheme.order, adaptive: false, random: false, starts_from_force: true }
+        let starts_from_force = self.scheme.outer_kicks;
+        IntegratorNature { order: self.scheme.order, adaptive: false, dense: false, random: false, starts_from_force }
     }
 
     fn advance(&mut self, block: &mut Block) {
@@ -121,108 +87,82 @@ impl Integrator for Splitting {
             self.position.push(motion.position);
             self.velocity.push(motion.velocity);
             self.acceleration.push(motion.acceleration);
-            self.strongest.push(motion.acceleration.norm());
+            self.strongest.push(if scheme.outer_kicks { motion.acceleration.norm_squared() } else { 0.0 });
             let flows = &mut self.flows[lane];
             if flows.of != of && !of.0.is_free() {
                 flows.of = of;
                 flows.flows.clear();
-                flows.flows.extend(scheme.flights.iter().map(|part| LinearFlow::new(&of.0, part * of.1)));
+                flows.flows.extend(scheme.lengths().iter().map(|part| LinearFlow::new(&of.0, part * of.1)));
             }
         }
         self.time.clear();
         self.time.extend(block.state.iter().map(|s| s.time));
-        for stage in 0..scheme.stages() {
-            let (kick, which) = (scheme.kick(stage), scheme.flight_index(stage));
-            for lane in 0..n {
-                let (state, trial) = (&block.state[lane], &block.trial[lane]);
-                let (r, v) = (&mut self.position[lane], &mut self.velocity[lane]);
-                *v += self.acceleration[lane] * (kick * trial.step);
-                if block.linear[lane].is_free() {
-                    *r += *v * (scheme.flights[which] * trial.step);
-                } else {
-                    self.flows[lane].flows[which].apply(r, v);
+        let outer = usize::from(scheme.outer_kicks);
+        if scheme.outer_kicks {
+            self.kick(block, scheme.kick(0));
+        }
+        for flight in 0..scheme.flights() {
+            self.fly(block, flight);
+            if flight + outer == scheme.kicks() {
+                break;
+            }
+            if flight + 1 == scheme.flights() {
+                for lane in 0..n {
+                    let (state, trial) = (&block.state[lane], &block.trial[lane]);
+                    self.time[lane] = block.forces.within(trial.end, state.time, trial.end);
                 }
-                self.time[lane] = if stage + 1 == scheme.stages() {
-                    block.forces.within(trial.end, state.time, trial.end)
-                } else {
-                    self.time[lane] + scheme.flights[which] * trial.step
-                };
             }
             block.forces.accelerations(&self.time, &self.position, &self.velocity, &mut self.acceleration);
             for (strongest, a) in self.strongest.iter_mut().zip(&self.acceleration) {
-                *strongest = strongest.max(a.norm());
+                *strongest = strongest.max(a.norm_squared());
             }
+            self.kick(block, scheme.kick(flight + outer));
         }
-        let kick = scheme.kick(scheme.stages());
         for lane in 0..n {
             let trial = &mut block.trial[lane];
             let before = block.state[lane].motion.velocity;
             trial.motion.position = self.position[lane];
-            trial.motion.velocity = self.velocity[lane] + self.acceleration[lane] * (kick * trial.step);
+            trial.motion.velocity = self.velocity[lane];
             trial.motion.acceleration = self.acceleration[lane];
-            trial.fresh = true;
-            let fastest = before.norm().max(trial.motion.velocity.norm()) + self.strongest[lane] * trial.step;
+            trial.fresh = scheme.outer_kicks;
+            if !block.watched {
+                trial.reach = 0.0;
+                continue;
+            }
+            let fastest = before.norm_squared().max(trial.motion.velocity.norm_squared()).sqrt()
+                + self.strongest[lane].sqrt() * trial.step;
             trial.reach = fastest * trial.step;
         }
     }
 
     fn paths(&mut self, block: &mut Block, lanes: &[usize], paths: &mut Vec<Path>) {
-        for &lane in lanes {
-            let (state, trial) = (&block.state[lane], &block.trial[lane]);
-            let whole =
-                |m: &crate::path::Motion| crate::path::Motion { acceleration: block.whole_acceleration(lane, m), ..*m };
-            paths.push(Path::quintic(state.time, trial.step, &whole(&state.motion), &whole(&trial.motion)));
-        }
+        paths_between(block, lanes, paths, self.scheme.outer_kicks);
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn parts_of_a_step_add_up_to_one_and_read_the_same_backwards() {
-        for scheme in [&VERLET, &BLANES_MOAN_4, &BLANES_MOAN_6] {
-            let stages = scheme.stages();
-            let kicks: Vec<f64> = (0..=stages).map(|n| scheme.kick(n)).collect();
-            let flights: Vec<f64> = (0..stages).map(|n| scheme.flights[scheme.flight_index(n)]).collect();
-            for list in [&kicks, &flights] {
-                assert!((list.iter().sum::<f64>() - 1.0).abs() < 1e-15);
-                assert!(list.iter().eq(list.iter().rev()));
+/// The ways of some grains as quintics through positions, velocities and accelerations at both ends of the step; the
+/// accelerations by the forces are asked for unless they are known.
+pub(super) fn paths_between(block: &mut Block, lanes: &[usize], paths: &mut Vec<Path>, known: bool) {
+    let ends = |lane: usize| (block.state[lane].motion, block.trial[lane].motion);
+    let (mut from, mut to): (Vec<Motion>, Vec<Motion>) = lanes.iter().map(|&lane| ends(lane)).unzip();
+    if !known {
+        let mut acceleration = Vec::new();
+        for (motions, late) in [(&mut from, false), (&mut to, true)] {
+            let time = |&lane: &usize| {
+                let (start, end) = (block.state[lane].time, block.trial[lane].end);
+                block.forces.within(if late { end } else { start }, start, end)
+            };
+            let time: Vec<f64> = lanes.iter().map(time).collect();
+            let position: Vec<Vec3> = motions.iter().map(|m| m.position).collect();
+            let velocity: Vec<Vec3> = motions.iter().map(|m| m.velocity).collect();
+            block.forces.accelerations_of(lanes, &time, &position, &velocity, &mut acceleration);
+            for (motion, a) in motions.iter_mut().zip(&acceleration) {
+                motion.acceleration = *a;
             }
         }
-        assert_eq!([VERLET.stages(), BLANES_MOAN_4.stages(), BLANES_MOAN_6.stages()], [1, 6, 11]);
     }
-
-    #[test]
-    fn a_step_of_an_oscillator_has_the_series_of_sine_and_cosine() {
-        // x' = v, v' = -x: position and velocity after a step are polynomials in h; up to the order of the method their
-        // coefficients must be those of cos and sin, to the 15 digits of the paper's table. A slope would not see an error
-        // in the twelfth digit.
-        for scheme in [&VERLET, &BLANES_MOAN_4, &BLANES_MOAN_6] {
-            for (x0, v0) in [(1.0, 0.0), (0.0, 1.0)] {
-                let (mut x, mut v) = ([0.0; 9], [0.0; 9]);
-                (x[0], v[0]) = (x0, v0);
-                for stage in 0..=scheme.stages() {
-                    for k in (1..9).rev() {
-                        v[k] -= scheme.kick(stage) * x[k - 1];
-                    }
-                    if stage < scheme.stages() {
-                        for k in (1..9).rev() {
-                            x[k] += scheme.flights[scheme.flight_index(stage)] * v[k - 1];
-                        }
-                    }
-                }
-                let mut factorial = 1.0;
-                for k in 0..=scheme.order as usize {
-                    factorial *= k.max(1) as f64;
-                    // x = x0 cos h + v0 sin h, v = v0 cos h - x0 sin h.
-                    let sign = [1.0, 1.0, -1.0, -1.0][k % 4] / factorial;
-                    let (cos, sin) = if k % 2 == 0 { (sign, 0.0) } else { (0.0, sign) };
-                    assert!((x[k] - x0 * cos - v0 * sin).abs() < 2e-15, "order {} at {k}: {}", scheme.order, x[k]);
-                    assert!((v[k] - v0 * cos + x0 * sin).abs() < 2e-15, "order {} at {k}: {}", scheme.order, v[k]);
-                }
-            }
-        }
+    for (i, &lane) in lanes.iter().enumerate() {
+        let whole = |m: &Motion| Motion { acceleration: block.whole_acceleration(lane, m), ..*m };
+        paths.push(Path::quintic(block.state[lane].time, block.trial[lane].step, &whole(&from[i]), &whole(&to[i])));
     }
 }

@@ -1,0 +1,319 @@
+//! What tracing costs at the accuracies that design work asks for: core-seconds beside errors, as rows of a Markdown table.
+//!
+//! `cargo bench -p graintrap-tracer --bench limits`; `-- paul coulomb` runs the rows whose names hold one of the words.
+//! Seconds are processor time of one thread, so that a busy machine gives what an idle one does; the least of three runs.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+use std::time::Instant;
+
+use field::{BasisField, DrivenField, QuadraticField, Samples, Waveform, WaveformPart};
+use meshes::Vec3;
+use tracer::{Batch, Coulomb, Ensemble, Force, Grain, Method, Nothing, Options, Scratch, System, trace};
+
+fn main() {
+    // Everything on the thread that is timed.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
+    pool.build_global().expect("no pool has been used yet");
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    println!("| work | core-seconds | rate | error |\n|---|---|---|---|");
+    let rows: [(&str, fn()); 7] = [
+        ("paul", paul),
+        ("points", points),
+        ("pairs", pairs),
+        ("coupled", coupled),
+        ("stability", stability),
+        ("many", many),
+        ("memory", memory),
+    ];
+    for (name, row) in rows {
+        if words.is_empty() || words.iter().any(|word| name.contains(word.as_str())) {
+            row();
+        }
+    }
+}
+
+/// Processor time of this thread so far, s; where the system does not tell, the time of day.
+fn seconds(start: &Instant) -> f64 {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let nanoseconds = told.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
+    nanoseconds.map_or(start.elapsed().as_secs_f64(), |ns| 1e-9 * ns)
+}
+
+/// The least processor time of three runs, s, and what the last gave.
+fn timed<T>(mut work: impl FnMut() -> T) -> (f64, T) {
+    let clock = Instant::now();
+    let mut once = || {
+        let before = seconds(&clock);
+        let out = work();
+        (seconds(&clock) - before, out)
+    };
+    let (first, second, (third, out)) = (once().0, once().0, once());
+    (first.min(second).min(third), out)
+}
+
+fn grain(position: Vec3, velocity: Vec3, id: u64) -> Grain {
+    Grain { position, velocity, charge: 1.0, mass: 1.0, radius: 0.0, id, group: 0 }
+}
+
+fn cloud(count: usize) -> Ensemble {
+    let mut ensemble = Ensemble::new();
+    let mut stream = tracer::stream::Stream::new(3, tracer::stream::Purpose::Start, 0, 0);
+    let mut next = || 2.0 * stream.unit() - 1.0;
+    for k in 0..count {
+        let (r, u) = (Vec3::new(next(), next(), next()), Vec3::new(next(), next(), next()) * 0.1);
+        ensemble.push(grain(r, u, k as u64)).expect("a sound grain");
+    }
+    ensemble
+}
+
+/// u'' + (a - 2 q cos 2t) u = 0 with a = 0, q = 0.2 along x and y and -0.4 along z.
+const Q: [f64; 3] = [0.2, 0.2, -0.4];
+
+fn paul_trap() -> System {
+    paul_trap_in(QuadraticField::quadrupole(Vec3::new(1.0, 1.0, -2.0), 1.0))
+}
+
+fn paul_trap_in(basis: impl BasisField + 'static) -> System {
+    let drive = WaveformPart::Sine { amplitude: -0.4, frequency: 2.0 / TAU, phase: 0.0 };
+    System::new().with_field(DrivenField::new(Arc::new(basis), vec![Waveform { constant: 0.0, parts: vec![drive] }]))
+}
+
+/// The map of (u, u') over a period of the Mathieu equation, by 4000 steps of the classical Runge-Kutta scheme: to 1e-13.
+fn period(q: f64) -> [f64; 4] {
+    let force = |t: f64, u: f64| 2.0 * q * (2.0 * t).cos() * u;
+    let flown = |mut u: f64, mut v: f64| {
+        let h = PI / 4000.0;
+        for k in 0..4000 {
+            let t = h * f64::from(k);
+            let (k1, l1) = (v, force(t, u));
+            let (k2, l2) = (v + 0.5 * h * l1, force(t + 0.5 * h, u + 0.5 * h * k1));
+            let (k3, l3) = (v + 0.5 * h * l2, force(t + 0.5 * h, u + 0.5 * h * k2));
+            let (k4, l4) = (v + h * l3, force(t + h, u + h * k3));
+            u += h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4);
+            v += h / 6.0 * (l1 + 2.0 * (l2 + l3) + l4);
+        }
+        (u, v)
+    };
+    let ((a, c), (b, d)) = (flown(1.0, 0.0), flown(0.0, 1.0));
+    [a, b, c, d]
+}
+
+/// A thousand grains, a thousand periods.
+fn paul() {
+    let whole = Options { duration: 1000.0 * PI, ..Options::default() };
+    let with = |method, steps: f64| {
+        (format!("{method:?}, {steps} steps a period"), Options { method, step: Some(PI / steps), ..whole.clone() })
+    };
+    thousand(
+        &paul_trap(),
+        &[
+            ("as by default".into(), whole.clone()),
+            ("tolerance 1e-8".into(), Options { tolerance: 1e-8, ..whole.clone() }),
+            with(Method::BlanesMoan14, 8.0),
+            with(Method::BlanesMoan14, 10.0),
+            with(Method::BlanesMoan6, 16.0),
+        ],
+    );
+}
+
+/// A field that does not say that it is quadratic.
+struct Hidden(QuadraticField);
+
+impl BasisField for Hidden {
+    fn channels(&self) -> usize {
+        self.0.channels()
+    }
+
+    fn sample(&self, points: &[Vec3], samples: &mut Samples) {
+        self.0.sample(points, samples);
+    }
+}
+
+/// The same where the field is asked for point by point: what a field that costs nothing leaves to the tracer.
+fn points() {
+    let system = paul_trap_in(Hidden(QuadraticField::quadrupole(Vec3::new(1.0, 1.0, -2.0), 1.0)));
+    let whole = Options { duration: 1000.0 * PI, ..Options::default() };
+    let fixed = |method, steps: f64| Options { method, step: Some(PI / steps), ..whole.clone() };
+    thousand(
+        &system,
+        &[
+            ("point by point, Stoermer12, 36 steps a period".into(), fixed(Method::Stoermer12, 36.0)),
+            ("point by point, Stoermer12, 48 steps a period".into(), fixed(Method::Stoermer12, 48.0)),
+            ("point by point, BlanesMoan14, 10 steps a period".into(), fixed(Method::BlanesMoan14, 10.0)),
+            (
+                "point by point, Dop853, 1e-8 a step".into(),
+                Options { method: Method::Dop853, tolerance: 1e-8, ..whole.clone() },
+            ),
+        ],
+    );
+}
+
+fn thousand(system: &System, runs: &[(String, Options)]) {
+    let grains = cloud(1000);
+    let maps = Q.map(period);
+    let exact = |g: usize, k: usize| {
+        let (mut u, mut v) = (grains.positions()[g][k], grains.velocities()[g][k]);
+        for _ in 0..1000 {
+            let [a, b, c, d] = maps[k];
+            (u, v) = (a * u + b * v, c * u + d * v);
+        }
+        u
+    };
+    let exact: Vec<Vec3> = (0..1000).map(|g| Vec3::new(exact(g, 0), exact(g, 1), exact(g, 2))).collect();
+    let size = (exact.iter().map(Vec3::norm_squared).sum::<f64>() / 1000.0).sqrt();
+    for (name, options) in runs {
+        let (seconds, traced) = timed(|| trace(system, &grains, options, &Nothing).expect("a sound run"));
+        let off = traced.ensemble.positions().iter().zip(&exact).map(|(a, b)| (a - b).norm_squared()).sum::<f64>();
+        let told = traced.error.map_or("-".into(), |e| format!("{:.1e}", e.position));
+        println!(
+            "| 1000 grains, 1000 RF periods, ideal trap, {name} | {seconds:.3} | {:.0} M steps/s | {:.1e}, told {told} |",
+            traced.accepted as f64 / seconds * 1e-6,
+            (off / 1000.0).sqrt() / size,
+        );
+    }
+}
+
+fn batch<'a>(grains: &'a Ensemble, time: &'a [f64]) -> Batch<'a> {
+    Batch {
+        position: grains.positions(),
+        velocity: grains.velocities(),
+        time,
+        charge: grains.charges(),
+        mass: grains.masses(),
+        radius: grains.radii(),
+        id: grains.ids(),
+    }
+}
+
+/// Root mean square of the differences over that of the second list.
+fn apart(a: &[Vec3], b: &[Vec3]) -> f64 {
+    let off: f64 = a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum();
+    (off / b.iter().map(Vec3::norm_squared).sum::<f64>()).sqrt()
+}
+
+/// Coulomb forces by the direct sum.
+fn pairs() {
+    for (count, times) in [(100, 2000), (1000, 50), (8000, 1)] {
+        let grains = cloud(count);
+        let time = vec![0.0; count];
+        let (mut force, mut slow) = (vec![Vec3::zeros(); count], vec![Vec3::zeros(); count]);
+        let mut scratch = Scratch::default();
+        let (seconds, ()) = timed(|| {
+            for _ in 0..times {
+                force.fill(Vec3::zeros());
+                Coulomb::default().add(&batch(&grains, &time), &mut scratch, &mut force);
+            }
+        });
+        tracer::force::coulomb::slow_coulomb(&batch(&grains, &time), &mut slow);
+        println!(
+            "| Coulomb forces, {count} grains, direct | {:.2e} | {:.2} G pairs/s | {:.1e} |",
+            seconds / f64::from(times),
+            (count * count) as f64 * f64::from(times) / seconds * 1e-9,
+            apart(&force, &slow),
+        );
+    }
+}
+
+/// Maps of the first region of stability, 200 x 200; the error is the part of the map that differs from Floquet's.
+fn stability() {
+    use tracer::stability::{mathieu_map, mathieu_map_by_flights};
+    let a: Vec<f64> = (0..200).map(|i| -0.2 + 0.0035 * f64::from(i)).collect();
+    let q: Vec<f64> = (0..200).map(|j| 0.005 * (0.5 + f64::from(j))).collect();
+    let (floquet, exact) = timed(|| mathieu_map(&a, &q, 0.0));
+    let (flights, flown) = timed(|| mathieu_map_by_flights(&a, &q, 100, 1e2));
+    let differ = (0..40_000).filter(|k| exact.is_stable(k / 200, k % 200) != flown.is_stable(k / 200, k % 200)).count();
+    println!("| stability map 200 x 200, Floquet | {floquet:.4} | {:.0} M points/s | - |", 0.04 / floquet);
+    println!(
+        "| the same by flights of 100 periods | {flights:.4} | {:.0} M periods/s | {:.1e} |",
+        4.0 / flights,
+        differ as f64 / 40_000.0
+    );
+}
+
+/// Coulomb forces by multipoles; the error at a thousand of the grains, over the size of all forces.
+fn many() {
+    for (count, accuracy) in [
+        (4001, None),
+        (4001, Some(1e-4)),
+        (4001, Some(1e-6)),
+        (100_000, Some(1e-4)),
+        (100_000, Some(1e-6)),
+        (1_000_000, Some(1e-4)),
+    ] {
+        let grains = cloud(count);
+        let time = vec![0.0; count];
+        let mut force = vec![Vec3::zeros(); count];
+        let mut scratch = Scratch::default();
+        let sum = Coulomb { accuracy };
+        let (seconds, ()) = timed(|| {
+            force.fill(Vec3::zeros());
+            sum.add(&batch(&grains, &time), &mut scratch, &mut force);
+        });
+        let (mut off, mut size) = (0.0, 0.0);
+        for i in (0..count).step_by(count / 1000) {
+            let mut exact = Vec3::zeros();
+            for (j, r) in grains.positions().iter().enumerate().filter(|(j, _)| *j != i) {
+                let d = grains.positions()[i] - r;
+                exact += d * (field::constants::COULOMB * grains.charges()[j] / d.norm().powi(3));
+            }
+            off += (force[i] - exact).norm_squared();
+            size += exact.norm_squared();
+        }
+        let how = accuracy.map_or("direct".into(), |accuracy| format!("{accuracy:.0e} asked"));
+        println!(
+            "| Coulomb forces, {count} grains, {how} | {seconds:.3} | {:.2} M grains/s | {:.1e} |",
+            count as f64 / seconds * 1e-6,
+            (off / size).sqrt(),
+        );
+    }
+}
+
+/// A step of ten grains that repel each other in a trap.
+fn coupled() {
+    let grains = cloud(10);
+    let mut weak = Ensemble::new();
+    for k in 0..10 {
+        weak.push(Grain { charge: 1e-7, mass: 1e-7, ..grains.grain(k) }).expect("a sound grain");
+    }
+    let system = paul_trap().with_coulomb();
+    for (method, steps) in [(Method::Verlet, 100.0), (Method::BlanesMoan14, 16.0), (Method::Dop853, 16.0)] {
+        let options = Options {
+            method,
+            step: Some(PI / steps),
+            duration: 1000.0 * PI,
+            estimate_error: false,
+            ..Options::default()
+        };
+        let (seconds, traced) = timed(|| trace(&system, &weak, &options, &Nothing).expect("a sound run"));
+        let taken = traced.accepted as f64 / 10.0;
+        println!(
+            "| ten coupled grains, {method:?} | {seconds:.3} | {:.2} µs/step, {:.2} µs/force | - |",
+            seconds / taken * 1e6,
+            seconds / traced.force_evaluations as f64 * 1e7,
+        );
+    }
+}
+
+/// Peak memory of a million grains that do not feel each other, without samples.
+fn memory() {
+    let peak = || {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let line = status.lines().find(|line| line.starts_with("VmHWM")).unwrap_or_default();
+        line.split_whitespace().nth(1).and_then(|kb| kb.parse::<f64>().ok()).unwrap_or(f64::NAN) * 1024.0
+    };
+    let count = 1_000_000;
+    let grains = cloud(count);
+    let before = peak();
+    let options = Options { duration: PI, estimate_error: false, ..Options::default() };
+    let clock = Instant::now();
+    let start = seconds(&clock);
+    let traced = trace(&paul_trap(), &grains, &options, &Nothing).expect("a sound run");
+    println!(
+        "| 1e6 independent grains, one period | {:.2} | {:.0} bytes a grain beside the ensemble's {:.0} | - |",
+        seconds(&clock) - start,
+        (peak() - before) / count as f64,
+        before / count as f64,
+    );
+    drop(traced);
+}
