@@ -279,6 +279,7 @@ impl<const DAMPED: bool, const PUSHED: bool, const UNIFORM: bool> WithSimd for V
 }
 
 /// Flies `T` vectors of grains over all steps.
+#[allow(clippy::needless_range_loop)] // one index runs over several arrays
 #[inline(always)]
 fn fly<S: Simd, const T: usize, const DAMPED: bool, const PUSHED: bool, const UNIFORM: bool>(
     simd: S,
@@ -350,8 +351,8 @@ fn fly<S: Simd, const T: usize, const DAMPED: bool, const PUSHED: bool, const UN
     // By value: references to the numbers would keep them in memory all the way.
     let store = |list: &mut [f64], values: [S::f64s; T]| {
         let (list, _) = S::as_mut_simd_f64s(list);
-        for t in 0..T {
-            list[first + t] = values[t];
+        for (to, from) in list[first..first + T].iter_mut().zip(values) {
+            *to = from;
         }
     };
     for k in 0..3 {
