@@ -60,7 +60,6 @@ struct Kick {
 /// The grains in arrays of their own, filled up to whole vectors.
 #[derive(Default)]
 struct Lanes {
-    count: usize,
     /// x, y, z of the position at the start, then of the velocity.
     start: [Vec<f64>; 6],
     /// The same at the end.
@@ -209,7 +208,6 @@ impl Integrator for LinearSplitting {
 impl Lanes {
     fn fill(&mut self, block: &Block, scheme: &Scheme, form: &LinearForm, step: f64) {
         let padded = block.len().div_ceil(WIDTH) * WIDTH;
-        self.count = block.len();
         for k in 0..6 {
             self.start[k].clear();
             self.start[k].extend(block.state.iter().map(|s| {
