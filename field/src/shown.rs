@@ -8,6 +8,9 @@ use crate::panel::{Panel, quadrature};
 /// Degree of the rule that integrates densities over a panel.
 const DEGREE: usize = 2;
 
+/// Densities of all basis functions at points of electrodes, `point * functions + function`.
+type Densities<'a> = dyn Fn(&[(Vec3, usize)]) -> Vec<f64> + 'a;
+
 /// Charge of each panel (row) in each basis function (column), C, from densities (C/m²) at points of the surface; on every
 /// electrode they sum to `wanted(electrode, function)`.
 ///
@@ -17,7 +20,7 @@ pub(crate) fn charges(
     mesh: &SurfaceMesh,
     panels: &[Panel],
     functions: usize,
-    densities: &dyn Fn(&[(Vec3, usize)]) -> Vec<f64>,
+    densities: &Densities,
     wanted: &dyn Fn(usize, usize) -> f64,
 ) -> Mat<f64> {
     let rule = quadrature::rule(DEGREE);

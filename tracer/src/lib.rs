@@ -77,9 +77,16 @@
 //! both cases no bit of the result depends on the number of threads; random numbers belong to grain and step
 //! ([`stream::Stream`]).
 //!
-//! The default integrator is Dormand and Prince's of order 8, whose dense output gives samples, and the time and place of a
-//! strike, to the accuracy of the steps themselves. [`Method`] lists the others. Surfaces cost nothing while a grain is far
-//! from them, and no step is too long for a wire to be met.
+//! Where forces are linear in the position (an ideal quadrupole, a uniform field, gravity: fields that say so through
+//! [`field::BasisField::quadratics`]), the default is a symplectic scheme of order 6 with a step from the tolerance, which flies
+//! vectors of grains over many steps at once as long as nothing is near.
+//!
+//! Elsewhere it is Dormand and Prince's of order 8, whose dense output gives samples, and the time and place of a strike, to the
+//! accuracy of the steps themselves. [`Method`] lists the others; `Stoermer12` takes a quarter of the forces where these are
+//! smooth and dear. Surfaces cost nothing while a grain is far from them, and no step is too long for a wire to be met.
+//!
+//! The mutual force of some thousand grains is summed pair by pair, that of more by multipoles to an accuracy
+//! ([`Coulomb`]). [`stability`] maps where motions in a quadrupole stay bounded, without flying grains at all.
 
 pub mod checkpoint;
 pub mod cloud;

@@ -190,10 +190,10 @@ impl WithSimd for Row<'_> {
                     peak[t] = simd.select_f64s(less, peak[t], size);
                 }
             }
-            for t in 0..T {
-                us[first + t] = u[t];
-                vs[first + t] = v[t];
-                peaks[first + t] = peak[t];
+            for (list, values) in [(&mut *us, u), (&mut *vs, v), (&mut *peaks, peak)] {
+                for (to, from) in list[first..first + T].iter_mut().zip(values) {
+                    *to = from;
+                }
             }
         }
     }

@@ -231,6 +231,8 @@ pub enum Integrator {
     Symplectic4,
     /// Symplectic of order 6.
     Symplectic6,
+    /// Multistep of order 12, one force a step, for smooth forces without magnetic field.
+    Stoermer12,
 }
 
 /// `[output]`

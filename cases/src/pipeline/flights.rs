@@ -308,6 +308,7 @@ pub fn fly(
             Integrator::Langevin => Method::Langevin,
             Integrator::Symplectic4 => Method::BlanesMoan4,
             Integrator::Symplectic6 => Method::BlanesMoan6,
+            Integrator::Stoermer12 => Method::Stoermer12,
         },
         start: settings.start,
         duration: settings.duration,

@@ -1,7 +1,7 @@
 //! Dormand and Prince's 8(5,3), with its dense output.
 
 use meshes::Vec3;
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::dop853_table::{DENSE, ERROR_5, SOLUTION, SOLUTION_3, STAGES};
 use super::{Integrator, IntegratorNature};
@@ -78,17 +78,26 @@ fn vector(list: &[f64], index: usize) -> Vec3 {
 }
 
 /// Weighted sum of derivatives, number by number.
-#[inline(always)]
-fn combine(weights: &[(usize, f64)], k: &[Vec<f64>], out: &mut [f64]) {
-    for (c, out) in out.as_chunks_mut::<WIDTH>().0.iter_mut().enumerate() {
-        let mut sum = [0.0; WIDTH];
-        for &(j, w) in weights {
-            let k = &k[j].as_chunks::<WIDTH>().0[c];
-            for (s, k) in sum.iter_mut().zip(k) {
-                *s += w * k;
+struct Combine<'a> {
+    weights: &'a [(usize, f64)],
+    k: &'a [Vec<f64>],
+    out: &'a mut [f64],
+}
+
+impl WithSimd for Combine<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let (out, _) = S::as_mut_simd_f64s(self.out);
+        for (c, out) in out.iter_mut().enumerate() {
+            let mut sum = simd.splat_f64s(0.0);
+            for &(j, w) in self.weights {
+                let (k, _) = S::as_simd_f64s(&self.k[j]);
+                sum = simd.add_f64s(sum, simd.mul_f64s(simd.splat_f64s(w), k[c]));
             }
+            *out = sum;
         }
-        *out = sum;
     }
 }
 
@@ -120,7 +129,7 @@ impl Integrator for Dop853 {
         for stage in 1..=12 {
             let (c, weights) = if stage < 12 { (STAGES[stage - 1].c, STAGES[stage - 1].a) } else { (1.0, SOLUTION) };
             let (k, sum) = (&self.k[..], &mut self.sum[..]);
-            self.arch.dispatch(|| combine(weights, k, sum));
+            self.arch.dispatch(Combine { weights, k, out: sum });
             for lane in 0..n {
                 let (state, trial) = (&block.state[lane], &block.trial[lane]);
                 self.stage.position[lane] = state.motion.position + vector(&self.sum, lane) * trial.step;
@@ -137,10 +146,8 @@ impl Integrator for Dop853 {
             }
         }
         let (k, [five, three]) = (&self.k[..], &mut self.error);
-        self.arch.dispatch(|| {
-            combine(ERROR_5, k, five);
-            combine(SOLUTION_3, k, three);
-        });
+        self.arch.dispatch(Combine { weights: ERROR_5, k, out: five });
+        self.arch.dispatch(Combine { weights: SOLUTION_3, k, out: three });
         // `sum` still holds the weighted sum of the solution.
         for lane in 0..n {
             let state = block.state[lane];

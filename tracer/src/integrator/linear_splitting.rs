@@ -60,7 +60,6 @@ struct Kick {
 /// The grains in arrays of their own, filled up to whole vectors.
 #[derive(Default)]
 struct Lanes {
-    count: usize,
     /// x, y, z of the position at the start, then of the velocity.
     start: [Vec<f64>; 6],
     /// The same at the end.
@@ -209,7 +208,6 @@ impl Integrator for LinearSplitting {
 impl Lanes {
     fn fill(&mut self, block: &Block, scheme: &Scheme, form: &LinearForm, step: f64) {
         let padded = block.len().div_ceil(WIDTH) * WIDTH;
-        self.count = block.len();
         for k in 0..6 {
             self.start[k].clear();
             self.start[k].extend(block.state.iter().map(|s| {
@@ -279,6 +277,7 @@ impl<const DAMPED: bool, const PUSHED: bool, const UNIFORM: bool> WithSimd for V
 }
 
 /// Flies `T` vectors of grains over all steps.
+#[allow(clippy::needless_range_loop)] // one index runs over several arrays
 #[inline(always)]
 fn fly<S: Simd, const T: usize, const DAMPED: bool, const PUSHED: bool, const UNIFORM: bool>(
     simd: S,
@@ -350,8 +349,8 @@ fn fly<S: Simd, const T: usize, const DAMPED: bool, const PUSHED: bool, const UN
     // By value: references to the numbers would keep them in memory all the way.
     let store = |list: &mut [f64], values: [S::f64s; T]| {
         let (list, _) = S::as_mut_simd_f64s(list);
-        for t in 0..T {
-            list[first + t] = values[t];
+        for (to, from) in list[first..first + T].iter_mut().zip(values) {
+            *to = from;
         }
     };
     for k in 0..3 {

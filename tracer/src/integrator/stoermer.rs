@@ -1,7 +1,7 @@
 //! Störmer's multistep scheme of order 12: one force a step.
 
 use meshes::Vec3;
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::scheme::BLANES_MOAN_14;
 use super::splitting::{Splitting, paths_between};
@@ -26,9 +26,8 @@ use crate::path::Path;
 pub(crate) struct Stoermer {
     starter: Splitting,
     weights: Weights,
-    /// Accelerations, the newest in `newest`; x, y, z of each grain one after the other, scaled by the drag since.
-    history: Vec<Vec<f64>>,
-    newest: usize,
+    /// Accelerations by age, the newest first; x, y, z of each grain one after the other, scaled by the drag since.
+    history: [Vec<f64>; TERMS],
     /// How many are known.
     filled: usize,
     /// The chord of the last step, m; known once all accelerations are.
@@ -112,8 +111,7 @@ impl Stoermer {
         Self {
             starter: Splitting::new(&BLANES_MOAN_14),
             weights: Weights::new(),
-            history: vec![Vec::new(); TERMS],
-            newest: 0,
+            history: std::array::from_fn(|_| Vec::new()),
             filled: 0,
             chord: Vec::new(),
             chord_known: false,
@@ -145,8 +143,8 @@ impl Stoermer {
         for list in [&mut self.now, &mut self.place, &mut self.speed, &mut self.chord] {
             list.resize(padded, 0.0);
         }
-        self.newest = (self.newest + 1) % TERMS;
-        let list = &mut self.history[self.newest];
+        self.history.rotate_right(1);
+        let list = &mut self.history[0];
         for (lane, state) in block.state.iter().enumerate() {
             let half = 0.5 * block.linear[lane].rate;
             let whole = state.motion.acceleration + state.motion.position * (half * half);
@@ -179,16 +177,11 @@ impl Stoermer {
         for (lane, state) in block.state.iter().enumerate() {
             let half = 0.5 * block.linear[lane].rate;
             let speed = state.motion.velocity + state.motion.position * half;
-            let known = self.weights.speed.iter().enumerate();
-            let sum: Vec3 = known.map(|(age, c)| vector(&self.history[self.slot(age)], lane) * *c).sum();
+            let known = self.weights.speed.iter().zip(&self.history);
+            let sum: Vec3 = known.map(|(c, list)| vector(list, lane) * *c).sum();
             self.chord[3 * lane..3 * lane + 3].copy_from_slice((speed * h - sum * (h * h)).as_slice());
         }
         self.chord_known = true;
-    }
-
-    /// Where the acceleration of an age is kept.
-    fn slot(&self, age: usize) -> usize {
-        (self.newest + TERMS - age) % TERMS
     }
 }
 
@@ -200,8 +193,14 @@ impl Integrator for Stoermer {
     fn advance(&mut self, block: &mut Block) {
         self.note(block);
         let h = self.step;
-        let Self { weights, history, newest, chord, now, place, speed, decay, .. } = self;
-        self.arch.dispatch(|| combine(weights, h * h, history, *newest, (now, decay), (chord, place, speed)));
+        let Self { weights, history, chord, now, place, speed, decay, .. } = self;
+        if decay.iter().any(|&decay| decay != 1.0) {
+            let carry = |list: &mut [f64]| list.iter_mut().zip(&*decay).for_each(|(x, decay)| *x *= decay);
+            history.iter_mut().for_each(|list| carry(list));
+            carry(chord);
+            carry(now);
+        }
+        self.arch.dispatch(Sums { weights, h2: h * h, history, now, chord, place, speed });
         if self.filled < TERMS {
             self.starter.advance(block);
             return;
@@ -244,7 +243,7 @@ impl Integrator for Stoermer {
     fn memory(&self, lanes: usize) -> Vec<Vec<f64>> {
         let known = if self.filled == TERMS && self.chord_known { 1.0 } else { 0.0 };
         let of_lane = |lane: usize| {
-            let lists = (0..self.filled).map(|age| &self.history[self.slot(age)]).chain([&self.chord]);
+            let lists = self.history[..self.filled].iter().chain([&self.chord]);
             let numbers = lists.flat_map(|list| {
                 // Before the first step there are no lists.
                 (0..3).map(move |k| list.get(3 * lane + k).copied().unwrap_or(0.0))
@@ -257,16 +256,14 @@ impl Integrator for Stoermer {
     fn remember(&mut self, block: &Block, memory: &[&[f64]]) {
         let Some([filled, step, known, ..]) = memory.first() else { return };
         let padded = (3 * block.len()).div_ceil(WIDTH) * WIDTH;
-        (self.step, self.chord_known, self.newest) = (*step, *known == 1.0, 0);
+        (self.step, self.chord_known) = (*step, *known == 1.0);
         self.filled = (*filled as usize).min(TERMS);
         self.make_room(block, padded);
         self.chord.resize(padded, 0.0);
         for (lane, numbers) in memory.iter().enumerate() {
             let mut numbers = numbers[3..].chunks_exact(3);
-            for age in 0..self.filled {
-                let slot = self.slot(age);
-                let three = numbers.next().unwrap_or(&[0.0; 3]);
-                self.history[slot][3 * lane..3 * lane + 3].copy_from_slice(three);
+            for list in &mut self.history[..self.filled] {
+                list[3 * lane..3 * lane + 3].copy_from_slice(numbers.next().unwrap_or(&[0.0; 3]));
             }
             self.chord[3 * lane..3 * lane + 3].copy_from_slice(numbers.next().unwrap_or(&[0.0; 3]));
         }
@@ -290,35 +287,43 @@ fn vector(list: &[f64], index: usize) -> Vec3 {
     Vec3::new(list[3 * index], list[3 * index + 1], list[3 * index + 2])
 }
 
-/// Carries what is known over a step of drag, and finds the next positions and what the known accelerations add to h v.
-#[inline(always)]
-fn combine(
-    weights: &Weights,
+/// Finds the next chords and positions and what the known accelerations add to h v, all scaled to the end of the step.
+struct Sums<'a> {
+    weights: &'a Weights,
     h2: f64,
-    history: &mut [Vec<f64>],
-    newest: usize,
-    (now, decay): (&[f64], &[f64]),
-    (chord, place, speed): (&mut [f64], &mut [f64], &mut [f64]),
-) {
-    for c in 0..now.len() / WIDTH {
-        let decay = &decay.as_chunks::<WIDTH>().0[c];
-        let (mut sum, mut slope) = ([0.0; WIDTH], [0.0; WIDTH]);
-        for age in 0..TERMS {
-            let a = &mut history[(newest + TERMS - age) % TERMS].as_chunks_mut::<WIDTH>().0[c];
-            // The newest of those that the velocity takes is not known yet: this one is a step older for it.
-            let of_speed = if age + 1 < TERMS { weights.speed[age + 1] } else { 0.0 };
-            for k in 0..WIDTH {
-                a[k] *= decay[k];
-                sum[k] += weights.place[age] * a[k];
-                slope[k] += of_speed * a[k];
+    history: &'a [Vec<f64>; TERMS],
+    now: &'a [f64],
+    chord: &'a mut [f64],
+    place: &'a mut [f64],
+    speed: &'a mut [f64],
+}
+
+impl WithSimd for Sums<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let lists: [&[S::f64s]; TERMS] = std::array::from_fn(|age| S::as_simd_f64s(&self.history[age]).0);
+        let (now, _) = S::as_simd_f64s(self.now);
+        let (chord, _) = S::as_mut_simd_f64s(self.chord);
+        let (place, _) = S::as_mut_simd_f64s(self.place);
+        let (speed, _) = S::as_mut_simd_f64s(self.speed);
+        let (of_place, of_speed) = (&self.weights.place, &self.weights.speed);
+        let h2 = simd.splat_f64s(self.h2);
+        for c in 0..now.len() {
+            let zero = simd.splat_f64s(0.0);
+            let (mut sum, mut slope) = (zero, zero);
+            for age in 0..TERMS {
+                let a = lists[age][c];
+                sum = simd.mul_add_f64s(simd.splat_f64s(of_place[age]), a, sum);
+                // The newest of those that the velocity takes is not known yet: this one is a step older for it.
+                if age + 1 < TERMS {
+                    slope = simd.mul_add_f64s(simd.splat_f64s(of_speed[age + 1]), a, slope);
+                }
             }
-        }
-        let (now, chord) = (&now.as_chunks::<WIDTH>().0[c], &mut chord.as_chunks_mut::<WIDTH>().0[c]);
-        let (place, speed) = (&mut place.as_chunks_mut::<WIDTH>().0[c], &mut speed.as_chunks_mut::<WIDTH>().0[c]);
-        for k in 0..WIDTH {
-            chord[k] = decay[k] * chord[k] + h2 * sum[k];
-            place[k] = decay[k] * now[k] + chord[k];
-            speed[k] = h2 * slope[k];
+            chord[c] = simd.mul_add_f64s(h2, sum, chord[c]);
+            place[c] = simd.add_f64s(now[c], chord[c]);
+            speed[c] = simd.mul_f64s(h2, slope);
         }
     }
 }
