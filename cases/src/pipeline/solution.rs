@@ -57,8 +57,8 @@ const MOST_DENSE: usize = 8_000;
 /// As long take so many panels with multipoles.
 const MOST_ITERATED: usize = 40_000;
 
-/// And so many points of curved elements: 100 + 100 crossed wires to 1e-3 have half of it and take a minute.
-const MOST_CURVED: usize = 1_000_000;
+/// And so many points of curved elements: 100 + 100 crossed wires to 1e-3 have a third of it and take a minute on two cores.
+const MOST_CURVED: usize = 2_000_000;
 
 /// Meshes whose panels differ less in size than this tell nothing of the error.
 const NEAREST: f64 = 1.1;
