@@ -12,7 +12,7 @@ use meshes::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::block::State;
-use crate::flight::Grid;
+use crate::flight::Pace;
 use crate::{Ending, Observer, Sample};
 
 /// Who keeps frames. Called from several threads at once.
@@ -42,15 +42,7 @@ pub struct Frame {
 pub(crate) struct Flying {
     pub grain: usize,
     pub state: State,
-    pub corner: f64,
-    pub wanted: f64,
-    pub rejected: bool,
-    pub grid: Grid,
-    pub number: u64,
-    pub sample: u64,
-    pub anchor: Vec3,
-    pub clear: f64,
-    pub sampled: f64,
+    pub pace: Pace,
     /// What the integrator remembers of its way.
     pub memory: Vec<f64>,
 }

@@ -113,9 +113,8 @@ fn points_are_as_good_as_asked() {
     check_points(n, name, points, 1e-8);
 }
 
-/// Some ten seconds and 1 GiB.
+/// Some seconds and 1 GiB.
 #[test]
-#[ignore = "the translations of the finest accuracy take long"]
 fn the_finest_accuracy_is_reached() {
     let n = 40_000;
     for (name, points) in clouds(n).into_iter().skip(1).take(2) {

@@ -3,7 +3,6 @@
 use meshes::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::checkpoint::Flying;
 use crate::event::{Crossing, Met};
 use crate::path::Motion;
 use crate::{Ending, Outcome, Sample};
@@ -13,6 +12,15 @@ pub(crate) struct Lane {
     pub grain: usize,
     /// Whether its flight began in an earlier run.
     pub begun: bool,
+    pub pace: Pace,
+    pub buffer: Vec<Sample>,
+    /// A grain that ends at the end of the step now tried, and how.
+    pub fate: Option<Fate>,
+}
+
+/// What a grain's next steps depend on, besides its state.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Pace {
     /// Next time at which a force is not smooth, s.
     pub corner: f64,
     /// Step that the error control would like, s; zero before the first.
@@ -28,11 +36,8 @@ pub(crate) struct Lane {
     /// No event lies within `clear` (m) of `anchor`.
     pub anchor: Vec3,
     pub clear: f64,
-    pub buffer: Vec<Sample>,
     /// Time of the last sample, s.
     pub sampled: f64,
-    /// A grain that ends at the end of the step now tried, and how.
-    pub fate: Option<Fate>,
 }
 
 /// Even steps between two times at which a step must end.
@@ -60,27 +65,6 @@ pub(crate) enum Kind {
     Met(Crossing),
     Unstable,
     Stopped,
-}
-
-impl Lane {
-    /// As it was when it was kept.
-    pub fn resumed(flying: &Flying) -> Self {
-        Self {
-            grain: flying.grain,
-            begun: true,
-            corner: flying.corner,
-            wanted: flying.wanted,
-            rejected: flying.rejected,
-            grid: flying.grid,
-            number: flying.number,
-            sample: flying.sample,
-            anchor: flying.anchor,
-            clear: flying.clear,
-            buffer: Vec::new(),
-            sampled: flying.sampled,
-            fate: None,
-        }
-    }
 }
 
 impl Grid {

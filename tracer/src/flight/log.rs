@@ -57,15 +57,7 @@ impl<I: Integrator> Loop<'_, '_, I> {
         let flying = self.lanes.iter().zip(&self.block.state).zip(memory).map(|((l, state), memory)| Flying {
             grain: l.grain,
             state: *state,
-            corner: l.corner,
-            wanted: l.wanted,
-            rejected: l.rejected,
-            grid: l.grid,
-            number: l.number,
-            sample: l.sample,
-            anchor: l.anchor,
-            clear: l.clear,
-            sampled: l.sampled,
+            pace: l.pace,
             memory,
         });
         let frame = Frame {

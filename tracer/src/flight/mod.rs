@@ -6,8 +6,8 @@ mod sampling;
 
 use meshes::Vec3;
 
-pub(crate) use self::lane::Grid;
-use self::lane::{Fate, Kind, Lane};
+pub(crate) use self::lane::Pace;
+use self::lane::{Fate, Grid, Kind, Lane};
 use self::log::Log;
 use self::sampling::Point;
 
@@ -89,26 +89,28 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
         let start = run.options.start;
         let margin = block.forces.margin(start, start);
         let lanes = grains.iter().enumerate().map(|(lane, &grain)| {
-            if let Some(flying) = run.options.resume.as_ref().and_then(|standing| standing.flying.get(&grain)) {
-                block.state[lane] = flying.state;
-                return Lane::resumed(flying);
-            }
-            block.state[lane].time = start;
-            Lane {
-                begun: false,
-                grain,
-                corner: run.system.next_corner(start + 2.0 * margin),
-                wanted: 0.0,
-                rejected: false,
-                grid: Grid::default(),
-                number: 0,
-                sample: 0,
-                anchor: Vec3::zeros(),
-                clear: 0.0,
-                buffer: Vec::new(),
-                sampled: f64::NEG_INFINITY,
-                fate: None,
-            }
+            let kept = run.options.resume.as_ref().and_then(|standing| standing.flying.get(&grain));
+            let pace = match kept {
+                Some(flying) => {
+                    block.state[lane] = flying.state;
+                    flying.pace
+                }
+                None => {
+                    block.state[lane].time = start;
+                    Pace {
+                        corner: run.system.next_corner(start + 2.0 * margin),
+                        wanted: 0.0,
+                        rejected: false,
+                        grid: Grid::default(),
+                        number: 0,
+                        sample: 0,
+                        anchor: Vec3::zeros(),
+                        clear: 0.0,
+                        sampled: f64::NEG_INFINITY,
+                    }
+                }
+            };
+            Lane { grain, begun: kept.is_some(), pace, buffer: Vec::new(), fate: None }
         });
         let lanes: Vec<Lane> = lanes.collect();
         let known = |lane: &Lane| Some(run.options.resume.as_ref()?.flying.get(&lane.grain)?.memory.as_slice());
@@ -177,7 +179,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
             self.lanes[lane].fate = kind.map(|kind| Fate { time, position, velocity, kind });
             if kind.is_none() && self.run.options.every.is_some() {
                 self.points.push(Point { lane, time, position, velocity });
-                self.lanes[lane].sample = 1;
+                self.lanes[lane].pace.sample = 1;
             }
         }
         self.take_samples();
@@ -226,16 +228,16 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
             let state = &self.block.state[lane];
             let l = &mut self.lanes[lane];
             let (step, end) = if self.nature.adaptive {
-                if l.wanted == 0.0 {
+                if l.pace.wanted == 0.0 {
                     let first = |(state, linear)| self.run.first_step(state, linear);
-                    l.wanted = if self.run.shared {
+                    l.pace.wanted = if self.run.shared {
                         self.block.state.iter().zip(&self.block.linear).map(first).fold(f64::INFINITY, f64::min)
                     } else {
                         first((state, &self.block.linear[lane]))
                     };
                 }
-                let stop = self.run.options.end().min(l.corner);
-                let (room, step) = (stop - state.time, l.wanted.min(self.run.max_step));
+                let stop = self.run.options.end().min(l.pace.corner);
+                let (room, step) = (stop - state.time, l.pace.wanted.min(self.run.max_step));
                 // Never leave a remainder that is a small part of a step.
                 let end = if step >= room * (1.0 - 1e-12) {
                     stop
@@ -246,16 +248,16 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
                 };
                 (end - state.time, end)
             } else {
-                if l.grid.taken == l.grid.count {
-                    let sample = if self.nature.dense { f64::INFINITY } else { self.run.sample_time(l.sample) };
-                    let stop = self.run.options.end().min(l.corner).min(sample);
-                    l.grid = Grid::new(state.time, stop, self.run.step.min(self.run.max_step));
+                if l.pace.grid.taken == l.pace.grid.count {
+                    let sample = if self.nature.dense { f64::INFINITY } else { self.run.sample_time(l.pace.sample) };
+                    let stop = self.run.options.end().min(l.pace.corner).min(sample);
+                    l.pace.grid = Grid::new(state.time, stop, self.run.step.min(self.run.max_step));
                 }
-                (l.grid.step, l.grid.next_end())
+                (l.pace.grid.step, l.pace.grid.next_end())
             };
             let trial = &mut self.block.trial[lane];
-            (trial.step, trial.end, trial.number, trial.error) = (step, end, l.number, 0.0);
-            (trial.steps, trial.first) = (1, l.grid.taken == 0);
+            (trial.step, trial.end, trial.number, trial.error) = (step, end, l.pace.number, 0.0);
+            (trial.steps, trial.first) = (1, l.pace.grid.taken == 0);
         }
     }
 
@@ -265,7 +267,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
         let Some(first) = self.lanes.first().filter(|_| !self.run.shared && !self.nature.adaptive) else {
             return false;
         };
-        let (grid, steps) = (first.grid, self.leap.min(first.grid.count - first.grid.taken));
+        let (grid, steps) = (first.pace.grid, self.leap.min(first.pace.grid.count - first.pace.grid.taken));
         if steps < 2 {
             self.leap = (2 * self.leap).min(LONGEST_LEAP);
             return false;
@@ -339,9 +341,9 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
             return false;
         }
         let (l, trial) = (&mut self.lanes[lane], &self.block.trial[lane]);
-        l.wanted = trial.step * if trial.error.is_finite() { shrink(trial.error) } else { 0.1 };
-        l.rejected = true;
-        l.wanted >= self.least_step(lane)
+        l.pace.wanted = trial.step * if trial.error.is_finite() { shrink(trial.error) } else { 0.1 };
+        l.pace.rejected = true;
+        l.pace.wanted >= self.least_step(lane)
     }
 
     /// Below this, time hardly advances, s.
@@ -419,7 +421,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
         let mut all = false;
         for lane in (0..self.lanes.len()).filter(|&lane| good[lane]) {
             let sampled =
-                self.nature.dense && self.run.sample_time(self.lanes[lane].sample) < self.block.trial[lane].end;
+                self.nature.dense && self.run.sample_time(self.lanes[lane].pace.sample) < self.block.trial[lane].end;
             let met = self.lanes[lane].fate.is_none() && self.may_meet(lane);
             if sampled || met {
                 self.path_lanes.push(lane);
@@ -441,13 +443,13 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
         }
         let (from, reach) = (self.block.state[lane].motion.position, self.block.trial[lane].reach);
         let l = &mut self.lanes[lane];
-        if reach == 0.0 || (from - l.anchor).norm() + reach < l.clear {
+        if reach == 0.0 || (from - l.pace.anchor).norm() + reach < l.pace.clear {
             return false;
         }
-        l.anchor = from;
+        l.pace.anchor = from;
         let look = reach * (LOOK_AHEAD / self.block.trial[lane].steps as f64).max(2.0);
-        l.clear = self.run.events.iter().map(|event| event.distance(&from, look)).fold(look, f64::min);
-        reach >= l.clear
+        l.pace.clear = self.run.events.iter().map(|event| event.distance(&from, look)).fold(look, f64::min);
+        reach >= l.pace.clear
     }
 
     /// Notes what grains meet on their paths. With shared steps: whether the step is to be taken again, up to the first
@@ -488,7 +490,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
             return true;
         }
         for lane in &mut self.lanes {
-            lane.grid = Grid::default();
+            lane.pace.grid = Grid::default();
         }
         self.take_to(first);
         true
@@ -525,21 +527,21 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
         state.time = trial.end;
         state.motion = trial.motion;
         state.fresh = trial.fresh;
-        l.number += trial.steps;
-        l.grid.taken = (l.grid.taken + trial.steps).min(l.grid.count);
+        l.pace.number += trial.steps;
+        l.pace.grid.taken = (l.pace.grid.taken + trial.steps).min(l.pace.grid.count);
         if self.nature.adaptive {
             state.travel = state.travel.max((trial.motion.position - state.origin).norm());
             state.top_speed = state.top_speed.max(trial.motion.velocity.norm());
-            let factor = if l.rejected { grow(trial.error).min(1.0) } else { grow(trial.error) };
+            let factor = if l.pace.rejected { grow(trial.error).min(1.0) } else { grow(trial.error) };
             // A step cut short by a stop says nothing against the longer one that was wanted.
-            let cut = factor >= 1.0 && trial.step < 0.99 * l.wanted.min(run.max_step);
-            l.wanted = if cut { l.wanted.max(trial.step * factor) } else { trial.step * factor };
-            l.rejected = false;
+            let cut = factor >= 1.0 && trial.step < 0.99 * l.pace.wanted.min(run.max_step);
+            l.pace.wanted = if cut { l.pace.wanted.max(trial.step * factor) } else { trial.step * factor };
+            l.pace.rejected = false;
         }
-        if trial.end >= l.corner {
+        if trial.end >= l.pace.corner {
             state.fresh = false;
             let margin = self.block.forces.margin(trial.end, trial.end);
-            l.corner = run.system.next_corner(trial.end + 2.0 * margin);
+            l.pace.corner = run.system.next_corner(trial.end + 2.0 * margin);
         }
         if l.fate.is_none() && trial.end >= run.options.end() {
             l.fate = Some(Fate::here(trial.end, &trial.motion, Kind::TimeUp));

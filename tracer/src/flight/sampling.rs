@@ -30,7 +30,7 @@ impl<I: Integrator> Loop<'_, '_, I> {
             let l = &mut self.lanes[lane];
             let until = l.fate.map_or(trial.end, |fate| fate.time);
             loop {
-                let time = self.run.sample_time(l.sample);
+                let time = self.run.sample_time(l.pace.sample);
                 if time > until || (l.fate.is_some() && time >= until) {
                     break;
                 }
@@ -43,7 +43,7 @@ impl<I: Integrator> Loop<'_, '_, I> {
                     break;
                 };
                 self.points.push(Point { lane, time, position, velocity });
-                l.sample += 1;
+                l.pace.sample += 1;
             }
         }
         if self.run.shared {
@@ -99,10 +99,10 @@ impl<I: Integrator> Loop<'_, '_, I> {
     fn store(&mut self, lane: usize, sample: Sample) {
         let l = &mut self.lanes[lane];
         // A run that is stopped may end at a sample just taken; a grain in a singular field has no force to show.
-        if sample.time <= l.sampled || !finite(&sample.force) || !sample.potential_energy.is_finite() {
+        if sample.time <= l.pace.sampled || !finite(&sample.force) || !sample.potential_energy.is_finite() {
             return;
         }
-        l.sampled = sample.time;
+        l.pace.sampled = sample.time;
         l.buffer.push(sample);
         if l.buffer.len() >= BUFFER {
             self.record(lane);
