@@ -297,6 +297,11 @@ pub fn fly(
     let start = Instant::now();
     let every = sampling(case, settings, &field);
     warn_of_long_flights(settings, &field, &**reporter);
+    // A quarter of what is free, and no more than a gigabyte: beyond that files are too large to look at.
+    let limit = (memory::available() / 4).min(1 << 30) as usize;
+    // A checkpoint holds all samples, those that are left out of the tracks with them: where these are too many, so are those.
+    let samples = ensemble.len() as f64 * (settings.duration / every);
+    let journal = (samples * size_of::<Sample>() as f64 <= limit as f64).then_some(kept.journal);
     let system = system(case, field, induction, surface, region);
     let listener = Arc::clone(reporter);
     let options = Options {
@@ -316,19 +321,17 @@ pub fn fly(
         step: settings.step,
         every: Some(every),
         seed: settings.seed,
-        journal: Some(kept.journal),
+        journal,
         resume: kept.standing,
         progress: Some(Arc::new(move |done| listener.fraction(done))),
         ..Options::default()
     };
-    // A quarter of what is free, and no more than a gigabyte: beyond that files are too large to look at.
-    let limit = (memory::available() / 4).min(1 << 30) as usize;
     let observer = Trajectories::with_limit(limit);
     let traced = trace(&system, ensemble, &options, &observer).map_err(|error| explained(error, source))?;
     let stride = observer.stride();
     if stride > 1 {
         reporter.warning(&format!(
-            "the tracks are too long to keep: one sample in {stride} is written. Raise output.every"
+            "the tracks are too long to keep: one sample in {stride} is written, and no checkpoint. Raise output.every"
         ));
     }
     let samples = observer.into_samples();
