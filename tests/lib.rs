@@ -1,7 +1,7 @@
 //! What the validation suites share: reference values, meshes of several electrodes, random numbers from a fixed seed. The
 //! suites themselves are the test targets beside this file, one for each kind of evidence.
 
-use field::{BoundaryProblem, ElectrodeBasis, PotentialTable, TableOptions, TabulatedField, tabulate};
+use field::{BoundaryProblem, CELLS_PER_BRICK, ElectrodeBasis, PotentialTable, TableOptions, TabulatedField, tabulate};
 use meshes::{Placement, Shape, SurfaceMesh, SurfaceTree, Vec3, triangulate_to};
 use serde_json::Value;
 
@@ -107,18 +107,19 @@ pub struct TwoRings {
 }
 
 impl TwoRings {
-    /// With a table of so many cells along each side.
-    pub fn tabulated(cells: usize) -> Self {
+    /// With a table of so many bricks along each side.
+    pub fn tabulated(bricks: usize) -> Self {
         let ring = Shape::Ring { radius: 1.0, wire_radius: 0.02 };
         let mesh = several(&[(ring.clone(), at(-Vec3::z()), 400), (ring, at(Vec3::z()), 400)]);
         let basis = BoundaryProblem::new(&mesh).solve().expect("sound rings");
         let half = 0.6;
-        let (min, max, spacing) = (Vec3::repeat(-half), Vec3::repeat(half), Some(2.0 * half / cells as f64));
-        // The accuracy sets how exact the nodes are, here as exact as can be. Cells that do not reach it with their spacing
+        let (min, max) = (Vec3::repeat(-half), Vec3::repeat(half));
+        let spacing = Some(2.0 * half / (bricks * CELLS_PER_BRICK) as f64);
+        // The accuracy sets how exact the nodes are, here as exact as can be. Bricks that do not reach it with their spacing
         // are interpolated all the same: the table is to err by interpolation and by nothing else.
         let options = TableOptions { min, max, accuracy: 1e-8, spacing, max_bytes: 1 << 30 };
         let mut table = tabulate(&basis, &options, &|_| ()).expect("a small table").0;
-        table.tabulated.fill(true);
+        table.tabulate_all();
         Self { basis, table, half }
     }
 

@@ -28,7 +28,7 @@ pub const TABLE: &str = "cache/table.bin";
 const LARGEST_TABLE: u64 = 2 << 30;
 
 /// Raised when the same case gives other numbers than before, or the stored form changes.
-const EDITION: u32 = 2;
+const EDITION: u32 = 3;
 
 /// A digest: of what a file depends on, or of its content.
 pub type Digest = [u8; 32];
@@ -74,11 +74,10 @@ pub fn solution_key(case: &Case) -> Digest {
     digest(&[parts.geometry.as_bytes(), parts.sources.as_bytes()])
 }
 
-/// Everything that a table depends on: its solution, its settings, its box and the spacing it begins with.
+/// Everything that a table depends on: its solution, its settings, its box and where grains start near conductors.
 pub fn table_key(case: &Case, plan: &Plan) -> Digest {
-    let (min, max) = (plan.options.min, plan.options.max);
-    let numbers: Vec<u8> =
-        min.iter().chain(max.iter()).chain([&plan.first_spacing]).flat_map(|x| x.to_le_bytes()).collect();
+    let points = [plan.options.min, plan.options.max].into_iter().chain(plan.starts.iter().copied());
+    let numbers: Vec<u8> = points.flat_map(<[f64; 3]>::from).flat_map(f64::to_le_bytes).collect();
     digest(&[&solution_key(case), case.parts().table.as_bytes(), &numbers])
 }
 

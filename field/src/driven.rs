@@ -45,20 +45,19 @@ impl DrivenField {
         field: &mut [Vec3],
     ) {
         let channels = self.waveforms.len();
-        self.basis.sample(points, scratch);
-        potential.fill(0.0);
-        field.fill(Vec3::zeros());
-        for (c, waveform) in self.waveforms.iter().enumerate() {
+        let mut volts = std::mem::take(&mut scratch.factors);
+        volts.clear();
+        for p in 0..points.len() {
             // Grains that step together are all at one time.
-            let (mut time, mut volts) = (f64::NAN, 0.0);
-            for p in 0..points.len() {
-                if times[p] != time {
-                    (time, volts) = (times[p], waveform.value(times[p]));
-                }
-                potential[p] += volts * scratch.potential[p * channels + c];
-                field[p] -= scratch.gradient[p * channels + c] * volts;
+            if p > 0 && times[p] == times[p - 1] {
+                volts.extend_from_within((p - 1) * channels..p * channels);
+            } else {
+                volts.extend(self.waveforms.iter().map(|w| w.value(times[p])));
             }
         }
+        self.basis.sum(points, &volts, scratch, potential, field);
+        scratch.factors = volts;
+        field.iter_mut().for_each(|e| *e = -*e);
     }
 
     /// The first time after `t` at which some waveform is not smooth (a jump or a corner), or infinity.

@@ -115,6 +115,16 @@ impl PanelSum {
         self.ground.is_some_and(|plane| plane.holds(point))
     }
 
+    /// Whether there is a grounded plane.
+    pub(crate) fn is_grounded(&self) -> bool {
+        self.ground.is_some()
+    }
+
+    /// Whether there are sources in closed form.
+    pub(crate) fn has_sources(&self) -> bool {
+        !self.sources.is_empty()
+    }
+
     /// The solid electrode that holds a point and does not have it on its surface.
     fn below_surface(&self, point: &Vec3) -> Option<usize> {
         self.inside(point).filter(|_| self.tree.nearest(point, self.surface_reach).is_none())

@@ -1,6 +1,6 @@
 //! The table against the exact panel sum.
 
-use field::{BasisField, BoundaryProblem, Samples, TableOptions, TabulatedField, tabulate};
+use field::{BasisField, BoundaryProblem, CELLS_PER_BRICK, Samples, TableOptions, TabulatedField, tabulate};
 use graintrap_tests::{at, random, several};
 use meshes::{Placement, Shape, SurfaceMesh, Vec3};
 
@@ -38,7 +38,7 @@ fn exact_table_at_a_64th_of_the_region() {
         let (min, max, spacing) = (Vec3::repeat(-half), Vec3::repeat(half), half / 32.0);
         let options = TableOptions { min, max, accuracy: 1e-4, spacing: Some(spacing), max_bytes: 1 << 30 };
         let (table, report) = tabulate(&basis, &options, &|_| ()).unwrap();
-        assert_eq!(table.grid.cells, [64; 3]);
+        assert_eq!(table.grid().cells.map(|n| n * CELLS_PER_BRICK), [64; 3]);
         let exact = basis.panel_sum();
         // Points of their own, at least two cells away from every conductor.
         let mut next = random(1);

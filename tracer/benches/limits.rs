@@ -4,11 +4,14 @@
 //! Seconds are processor time of one thread, so that a busy machine gives what an idle one does; the least of three runs.
 
 use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use std::time::Instant;
 
-use field::{BasisField, DrivenField, QuadraticField, Samples, Waveform, WaveformPart};
-use meshes::Vec3;
+use field::{
+    BasisField, BoundaryProblem, DrivenField, ElectrodeBasis, PER_NODE, PotentialTable, QuadraticField, Samples,
+    TableOptions, TabulatedField, Waveform, WaveformPart, tabulate,
+};
+use meshes::{Placement, Shape, SurfaceMesh, Vec3, triangulate_to};
 use tracer::{Batch, Coulomb, Drag, Ensemble, Force, Grain, Method, Nothing, Options, Scratch, System, trace};
 
 fn main() {
@@ -17,9 +20,11 @@ fn main() {
     pool.build_global().expect("no pool has been used yet");
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     println!("| work | core-seconds | rate | error |\n|---|---|---|---|");
-    let rows: [(&str, fn()); 8] = [
+    let rows: [(&str, fn()); 10] = [
         ("paul", paul),
         ("points", points),
+        ("tabulated", flights_in_a_table),
+        ("interpolation", interpolation),
         ("pairs", pairs),
         ("coupled", coupled),
         ("cloud", cloud_in_a_gas),
@@ -41,15 +46,17 @@ fn seconds(start: &Instant) -> f64 {
     nanoseconds.map_or(start.elapsed().as_secs_f64(), |ns| 1e-9 * ns)
 }
 
+/// Processor time of one run, s, and what it gave.
+fn once<T>(mut work: impl FnMut() -> T) -> (f64, T) {
+    let clock = Instant::now();
+    let before = seconds(&clock);
+    let out = work();
+    (seconds(&clock) - before, out)
+}
+
 /// The least processor time of three runs, s, and what the last gave.
 fn timed<T>(mut work: impl FnMut() -> T) -> (f64, T) {
-    let clock = Instant::now();
-    let mut once = || {
-        let before = seconds(&clock);
-        let out = work();
-        (seconds(&clock) - before, out)
-    };
-    let (first, second, (third, out)) = (once().0, once().0, once());
+    let (first, second, (third, out)) = (once(&mut work).0, once(&mut work).0, once(&mut work));
     (first.min(second).min(third), out)
 }
 
@@ -148,6 +155,163 @@ fn points() {
             ),
         ],
     );
+}
+
+/// Two electrodes far from the box of the tables below, whose sum has as many functions as these tables.
+static FAR: LazyLock<ElectrodeBasis> = LazyLock::new(|| {
+    let ball = |name: &str, x: f64| {
+        let placement = Placement { center: Vec3::x() * x, axis: Vec3::z(), up: None };
+        let mesh = triangulate_to(&Shape::Sphere { radius: 0.1 }, 40).expect("a sound shape").0;
+        (name.to_string(), mesh.placed(&placement).expect("it has a direction"))
+    };
+    let mesh = SurfaceMesh::assemble([ball("left", -50.0), ball("right", 50.0)]);
+    BoundaryProblem::new(&mesh).solve().expect("sound balls")
+});
+
+/// Derivatives at a point (in the order of a table's nodes) of Σ_n f_n Re (u + i v)^n over the planes (x, y), (y, z), (z, x): planar
+/// multipoles. ∂_u^a ∂_v^b Re w^n = Re i^b n!/(n - a - b)! w^(n - a - b).
+fn multipoles(orders: &[(usize, f64)], p: &Vec3) -> [f64; PER_NODE] {
+    let mut all = [0.0; PER_NODE];
+    for (u, v) in [(0, 1), (1, 2), (2, 0)] {
+        let (radius, angle) = (p[u].hypot(p[v]), p[v].atan2(p[u]));
+        for (a, b) in (0..3).flat_map(|a| (0..3).map(move |b| (a, b))) {
+            let place = a * 3_usize.pow(u as u32) + b * 3_usize.pow(v as u32);
+            for &(n, f) in orders.iter().filter(|(n, _)| *n >= a + b) {
+                let left = n - a - b;
+                let factor: f64 = (left + 1..=n).map(|k| k as f64).product();
+                let turned = left as f64 * angle + b as f64 * PI / 2.0;
+                all[place] += f * factor * radius.powi(left as i32) * turned.cos();
+            }
+        }
+    }
+    all
+}
+
+/// What a trap of real electrodes has: mostly a quadrupole.
+const ORDERS: [(usize, f64); 7] = [(1, 0.3), (2, 1.0), (3, 0.5), (4, 0.5), (6, 0.2), (8, 0.1), (10, 0.05)];
+
+/// Half the side of the box of these tables.
+const HALF: f64 = 0.9;
+
+fn table_of_multipoles(cells: usize) -> PotentialTable {
+    let spacing = 2.0 * HALF / cells as f64;
+    let bricks = PotentialTable::bricks_for(Vec3::repeat(-HALF), Vec3::repeat(HALF), spacing);
+    PotentialTable::of_function(bricks, 1, |p| vec![multipoles(&ORDERS, p)])
+}
+
+/// Points of a table.
+fn interpolation() {
+    let one = [vec![1.0]];
+    // The exact sum takes no part: all points lie in the table.
+    let exact = Arc::new(FAR.combined(&[vec![1.0, 0.0]]));
+    for cells in [64, 128] {
+        let field = TabulatedField::new(&table_of_multipoles(cells), &one, exact.clone());
+        let mut stream = tracer::stream::Stream::new(5, tracer::stream::Purpose::Start, 0, 0);
+        let mut next = || 0.95 * HALF * (2.0 * stream.unit() - 1.0);
+        let random: Vec<Vec3> = (0..1_000_000).map(|_| Vec3::new(next(), next(), next())).collect();
+        // A thousand grains on circles, 36 points to a turn, in blocks of 64 as the tracer flies them.
+        let flight: Vec<Vec3> = (0..15)
+            .flat_map(|block| (0..1000).flat_map(move |step| (0..64).map(move |lane| (64 * block + lane, step))))
+            .map(|(grain, step)| {
+                let (sin, cos) = (TAU * f64::from(step) / 36.0).sin_cos();
+                0.7 * random[grain] + 0.1 * Vec3::new(cos, sin, 0.5 * cos)
+            })
+            .collect();
+        for (name, points) in [("in random order", &random), ("in flight", &flight)] {
+            let factors = [1.0; 64];
+            let (mut potential, mut gradient, mut scratch) = ([0.0; 64], [Vec3::zeros(); 64], Samples::default());
+            let mut all = |look: &mut dyn FnMut(&[Vec3], &[Vec3])| {
+                for points in points.chunks_exact(64) {
+                    field.sum(points, &factors, &mut scratch, &mut potential, &mut gradient);
+                    look(points, &gradient);
+                }
+            };
+            let (seconds, ()) = timed(|| all(&mut |_, _| ()));
+            let (mut off, mut strongest) = (0.0_f64, 0.0_f64);
+            all(&mut |points, gradient| {
+                for (p, g) in points.iter().zip(gradient).step_by(50) {
+                    let truth = multipoles(&ORDERS, p);
+                    let truth = Vec3::new(truth[1], truth[3], truth[9]);
+                    off = off.max((g - truth).norm());
+                    strongest = strongest.max(truth.norm());
+                }
+            });
+            println!(
+                "| potential and field, one channel, {cells}³ cells, points {name} | {seconds:.3} | {:.1} M points/s | {:.1e} of the strongest |",
+                points.len() as f64 / seconds * 1e-6,
+                off / strongest
+            );
+        }
+    }
+    let ring = |name: &str, z: f64| {
+        let placement = Placement { center: Vec3::z() * z, axis: Vec3::z(), up: None };
+        let ring = Shape::Ring { radius: 1.0, wire_radius: 0.02 };
+        let mesh = triangulate_to(&ring, 800).expect("a sound shape").0;
+        (name.to_string(), mesh.placed(&placement).expect("it has a direction"))
+    };
+    let mesh = SurfaceMesh::assemble([ring("below", -1.0), ring("above", 1.0)]);
+    let basis = BoundaryProblem::new(&mesh).solve().expect("sound rings");
+    let (min, max) = (Vec3::repeat(-0.6), Vec3::repeat(0.6));
+    let options = TableOptions { min, max, accuracy: 1e-6, spacing: Some(1.2 / 64.0), max_bytes: 1 << 32 };
+    let (seconds, (mut table, _)) = timed(|| tabulate(&basis, &options, &|_| ()).expect("a small table"));
+    table.tabulate_all();
+    let exact = Arc::new(basis.combined(&[vec![1.0, 1.0]]));
+    let field = TabulatedField::new(&table, &[vec![1.0, 1.0]], exact.clone());
+    let mut stream = tracer::stream::Stream::new(6, tracer::stream::Purpose::Start, 0, 0);
+    let mut next = || 0.6 * (2.0 * stream.unit() - 1.0);
+    let points: Vec<Vec3> = (0..2000).map(|_| Vec3::new(next(), next(), next())).collect();
+    let (mut truth, mut got) = (Samples::default(), Samples::default());
+    exact.sample(&points, &mut truth);
+    field.sample(&points, &mut got);
+    let strongest = truth.gradient.iter().map(Vec3::norm).fold(0.0, f64::max);
+    let off = truth.gradient.iter().zip(&got.gradient).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    println!(
+        "| two rings, 64³ cells between them, filled and measured | {seconds:.2} | - | {:.1e} of the strongest |",
+        off / strongest
+    );
+}
+
+/// A thousand grains for a thousand periods in a table of two channels, against finer steps in the same table.
+fn flights_in_a_table() {
+    let spacing = 2.0 / 64.0;
+    let bricks = PotentialTable::bricks_for(Vec3::repeat(-1.0), Vec3::repeat(1.0), spacing);
+    // A quadrupole for RF and another along the same axis, a tenth of a hexapole and of higher ones, for DC.
+    let table = PotentialTable::of_function(bricks, 2, |p| {
+        let mut rf = [0.0; PER_NODE];
+        (rf[0], rf[1], rf[3], rf[9]) = (0.5 * (p.x * p.x + p.y * p.y) - p.z * p.z, p.x, p.y, -2.0 * p.z);
+        (rf[2], rf[6], rf[18]) = (1.0, 1.0, -2.0);
+        let dc = multipoles(&[(2, 0.2), (3, 0.1), (4, 0.05), (6, 0.02)], p);
+        vec![rf, dc]
+    });
+    let weights = [vec![1.0, 0.0], vec![0.0, 1.0]];
+    let exact = Arc::new(FAR.combined(&weights));
+    let basis = Arc::new(TabulatedField::new(&table, &weights, exact));
+    let drive = WaveformPart::Sine { amplitude: -0.4, frequency: 2.0 / TAU, phase: 0.0 };
+    let waveforms = vec![Waveform { constant: 0.0, parts: vec![drive] }, Waveform::constant(0.01)];
+    let system = System::new().with_field(DrivenField::new(basis, waveforms));
+    let even = cloud(1000);
+    let mut grains = Ensemble::new();
+    for k in 0..1000 {
+        let (position, velocity) = (0.3 * even.positions()[k], 0.3 * even.velocities()[k]);
+        grains.push(Grain { position, velocity, ..even.grain(k) }).expect("sound");
+    }
+    let whole = Options { duration: 1000.0 * PI, estimate_error: false, ..Options::default() };
+    let fixed = |method, steps: f64| Options { method, step: Some(PI / steps), ..whole.clone() };
+    let best = trace(&system, &grains, &fixed(Method::Stoermer12, 160.0), &Nothing).expect("a sound run");
+    for (name, options) in [
+        ("as by default".to_string(), whole.clone()),
+        ("Stoermer12, 32 steps a period".into(), fixed(Method::Stoermer12, 32.0)),
+        ("Stoermer12, 40 steps a period".into(), fixed(Method::Stoermer12, 40.0)),
+        ("Stoermer12, 64 steps a period".into(), fixed(Method::Stoermer12, 64.0)),
+        ("BlanesMoan6, 16 steps a period".into(), fixed(Method::BlanesMoan6, 16.0)),
+    ] {
+        let (seconds, traced) = once(|| trace(&system, &grains, &options, &Nothing).expect("a sound run"));
+        println!(
+            "| 1000 grains, 1000 RF periods, table of two channels, {name} | {seconds:.2} | {:.0} M forces/s | {:.1e} |",
+            traced.force_evaluations as f64 / seconds * 1e-6,
+            apart(traced.ensemble.positions(), best.ensemble.positions()),
+        );
+    }
 }
 
 fn thousand(system: &System, runs: &[(String, Options)]) {

@@ -52,7 +52,7 @@ pub(super) fn solved(session: &Session, ready: &Ready) -> Result<Solution, Failu
 /// Tabulates, unless the table was kept.
 pub(super) fn tabulated(session: &Session, solution: &Solution) -> Result<(Plan, Tabulated), Failure> {
     let (case, source, basis) = (&session.case, &session.source, &solution.basis);
-    let plan = Plan::new(case, source, basis)?;
+    let plan = Plan::new(case, basis);
     let tabulated = match session.kept(session.cache.table(case, &plan)) {
         Some(tabulated) => {
             tabulated.warn_if_missed(case, &*session.progress);

@@ -89,8 +89,10 @@ pub struct TableSummary {
     pub nodes: usize,
     /// Bytes in memory.
     pub bytes: u64,
-    /// Edge of a cell, m.
+    /// Edge of the largest cells, m.
     pub spacing: f64,
+    /// Edge of the smallest cells, m.
+    pub finest_spacing: f64,
     /// Lower corner, m.
     pub min: [f64; 3],
     /// Upper corner, m.
@@ -101,9 +103,14 @@ pub struct TableSummary {
     pub potential_error: f64,
     /// Of the field, against the strongest field that was met.
     pub field_error: f64,
+    /// Largest |Laplacian| of what is interpolated times the edge of a cell, against the strongest field: zero for an exact
+    /// potential.
+    pub laplacian: f64,
+    /// Largest jump of the potential between cells, V per V.
+    pub jump: f64,
     /// Nearer than so many cells to a conductor the exact sum is used.
     pub exact_within_cells: f64,
-    /// Fraction of the cells that are interpolated.
+    /// Fraction of the space outside of conductors that is interpolated.
     pub interpolated_fraction: f64,
 }
 
@@ -217,16 +224,19 @@ impl SolveSummary {
 impl TableSummary {
     /// Of a table.
     pub fn new(tabulated: &Tabulated) -> Self {
-        let (grid, report) = (&tabulated.table.grid, &tabulated.report);
+        let (grid, report) = (tabulated.table.grid(), &tabulated.report);
         Self {
             nodes: report.nodes,
             bytes: report.bytes,
             spacing: report.spacing,
+            finest_spacing: report.finest_spacing,
             min: grid.min.into(),
             max: grid.max.into(),
             error_estimate: report.error(),
             potential_error: report.potential_error,
             field_error: report.field_error,
+            laplacian: report.laplacian,
+            jump: report.jump,
             exact_within_cells: report.layer,
             interpolated_fraction: report.tabulated_fraction,
         }
@@ -331,9 +341,13 @@ impl Summary {
             line(
                 "table",
                 format!(
-                    "{} nodes every {}, {}, measured error {:.0e}",
+                    "{} nodes, {}, {}, measured error {:.0e}",
                     table.nodes,
-                    metres(table.spacing),
+                    if table.finest_spacing < 0.9 * table.spacing {
+                        format!("cells of {} to {}", metres(table.finest_spacing), metres(table.spacing))
+                    } else {
+                        format!("cells of {}", metres(table.spacing))
+                    },
                     people(table.bytes),
                     table.error_estimate
                 ),

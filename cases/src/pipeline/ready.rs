@@ -1,6 +1,6 @@
 //! A case that can be run: what is wrong with its geometry is found before the long work starts.
 
-use field::{ElectrodeBasis, Grid, PotentialTable, Source};
+use field::{ElectrodeBasis, PotentialTable, Source};
 use meshes::{SurfaceMesh, SurfaceTree, Vec3};
 use tracer::{Ensemble, Region};
 
@@ -143,8 +143,8 @@ fn check_table(case: &Case, source: &CaseSource, mesh: &SurfaceMesh, sources: &[
     let functions = mesh.electrodes.len() + sources.len();
     let available = table_memory(case);
     let needed = |spacing: f64| {
-        let nodes = Grid::new(bounds.min, bounds.max, spacing).nodes();
-        (nodes, PotentialTable::bytes_while_filling(nodes, functions))
+        let bricks = PotentialTable::bricks_for(bounds.min, bounds.max, spacing);
+        (bricks.nodes(), PotentialTable::bytes_while_filling(&bricks, functions))
     };
     let (nodes, bytes) = needed(spacing);
     if bytes <= available {

@@ -2,7 +2,9 @@
 
 use std::time::Instant;
 
-use field::{ElectrodeBasis, PotentialTable, TableError, TableOptions, TableReport, starting_spacing, tabulate_from};
+use field::{
+    ElectrodeBasis, PotentialTable, TableError, TableOptions, TableReport, points_near_conductors, tabulate_around,
+};
 
 use meshes::Vec3;
 use serde::{Deserialize, Serialize};
@@ -46,16 +48,13 @@ impl Tabulated {
 pub struct Plan {
     /// Its box, accuracy and spacing, and the memory it may take.
     pub options: TableOptions,
-    /// The spacing to begin with, m. Grains have a part in the table through this and the box, and no other.
-    pub first_spacing: f64,
+    /// Where grains start near conductors, m. They have a part in the table through these and the box, and no other.
+    pub starts: Vec<Vec3>,
 }
 
 impl Plan {
     /// What the table of a case will be.
-    ///
-    /// # Errors
-    /// The table asked for does not fit in memory.
-    pub fn new(case: &Case, source: &CaseSource, basis: &ElectrodeBasis) -> Result<Self, Failure> {
+    pub fn new(case: &Case, basis: &ElectrodeBasis) -> Self {
         let bounds = region::table_box(case, &basis.mesh);
         let options = TableOptions {
             min: bounds.min,
@@ -64,8 +63,8 @@ impl Plan {
             spacing: case.table.spacing,
             max_bytes: table_memory(case),
         };
-        let first_spacing = starting_spacing(basis, &options, &starts(case)).map_err(|e| too_large(case, source, e))?;
-        Ok(Self { options, first_spacing })
+        let starts = points_near_conductors(basis, &options, &starts(case));
+        Self { options, starts }
     }
 }
 
@@ -87,7 +86,7 @@ pub fn table(
 ) -> Result<Tabulated, Failure> {
     reporter.stage("table");
     let start = Instant::now();
-    let (table, report) = tabulate_from(basis, &plan.options, plan.first_spacing, &|done| reporter.fraction(done))
+    let (table, report) = tabulate_around(basis, &plan.options, &plan.starts, &|done| reporter.fraction(done))
         .map_err(|error| too_large(case, source, error))?;
     let tabulated = Tabulated { table, report, seconds: start.elapsed().as_secs_f64(), kept: false };
     tabulated.warn_if_missed(case, reporter);

@@ -1,6 +1,6 @@
-//! Filling a table: potentials and their derivatives at every node, from expansions that are handed down a tree of boxes.
+//! Filling a table: potentials and their derivatives at nodes, from expansions that are handed down a tree of boxes.
 //!
-//! The box of all nodes is halved again and again. A panel that is far from a box (against the box's size) joins the box's
+//! The box of all nodes is halved again and again; parts without nodes are forgotten. A panel that is far from a box (against the box's size) joins the box's
 //! expansion and is done with; a near one is handed on to the box's parts. Expansions are moved to the parts' centres. What
 //! reaches a box of four cells is evaluated at its nodes by one matrix for all such boxes. Near conductors boxes shrink to two
 //! cells, whose nodes sum over the last near panels themselves, cut into pieces small against their distance.
@@ -48,7 +48,7 @@ fn degree_for(accuracy: f64) -> usize {
 /// What all boxes share.
 struct Filler<'a> {
     grid: Grid,
-    needed: &'a [bool],
+    nodes: &'a [[usize; 3]],
     pieces: Pieces<'a>,
     functions: usize,
     /// Asked of the field, relative.
@@ -63,11 +63,13 @@ struct Filler<'a> {
     arch: Arch,
 }
 
-/// A box at the end of the tree: what far panels make in it, and the near ones.
-struct Leaf {
+/// A box on the way down: what is far from it is in its expansion.
+struct Branch {
     cube: Cube,
-    expansion: Mat<f64>,
     near: Vec<Piece>,
+    expansion: Mat<f64>,
+    /// The numbers of its nodes: those within and on its lower faces.
+    nodes: Vec<u32>,
 }
 
 /// A box of cells.
@@ -78,49 +80,52 @@ struct Cube {
 }
 
 /// Derivatives at some nodes: node numbers, and `PER_NODE * functions` numbers for each.
-type Filled = Vec<(usize, Vec<f64>)>;
+type Filled = Vec<(u32, Vec<f64>)>;
 
-/// Potentials and derivatives of every basis function at every node marked as needed (zeros at the others), in units of
-/// cells: entry `(node * functions + function) * 27 + a + 3 b + 9 c`. Sources contribute what they induce on the electrodes,
+/// Potentials and derivatives of every basis function at given nodes of a grid, in units of its cells: entry
+/// `(n * functions + function) * 27 + a + 3 b + 9 c` for the n-th of `nodes`. Sources contribute what they induce on the electrodes,
 /// not their own field. `accuracy` is that of the field, relative; what is left out here is far below it. `progress` is told
 /// the fraction done.
 pub(super) fn fill(
     basis: &ElectrodeBasis,
     grid: Grid,
-    needed: &[bool],
+    nodes: &[[usize; 3]],
     accuracy: f64,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Vec<f64> {
     let functions = basis.functions();
     let per_node = PER_NODE * functions;
-    let mut nodes = vec![0.0; grid.nodes() * per_node];
-    let filler = Filler::new(basis, grid, needed, accuracy);
-    let pieces = filler.pieces.all();
+    let mut all = vec![0.0; nodes.len() * per_node];
+    let filler = Filler::new(basis, grid, nodes, accuracy);
+    // A box owns no nodes on its upper faces, and the outermost one has all.
     let mut edge = LEAF;
-    while edge < *grid.cells.iter().max().unwrap_or(&LEAF) {
+    while edge <= *grid.cells.iter().max().unwrap_or(&LEAF) {
         edge *= 2;
     }
     // Down to boxes of 16 cells one after the other, those in parallel: enough of them to keep all threads busy.
-    let root = Cube { first: [0; 3], edge };
-    let mut queue = vec![(root, pieces, Mat::zeros(coefficients(filler.degree), functions))];
-    while queue.first().is_some_and(|(cube, ..)| cube.edge > 4 * LEAF) {
-        queue = queue
-            .into_par_iter()
-            .flat_map_iter(|(cube, near, incoming)| {
-                let (expansion, near) = filler.take_far(&cube, near, incoming);
-                filler.parts(&cube, &near, &expansion)
-            })
-            .collect();
+    let mut queue = vec![Branch {
+        cube: Cube { first: [0; 3], edge },
+        near: filler.pieces.all(),
+        expansion: Mat::zeros(coefficients(filler.degree), functions),
+        nodes: (0..nodes.len() as u32).collect(),
+    }];
+    while queue.first().is_some_and(|branch| branch.cube.edge > 4 * LEAF) {
+        queue = queue.into_par_iter().flat_map_iter(|branch| filler.parts(&filler.take_far(branch))).collect();
     }
     let total = queue.len().max(1) as f64;
     let done = std::sync::atomic::AtomicUsize::new(0);
     // Groups of boxes, so that what has been computed but not yet stored stays small.
-    for group in queue.chunks(64) {
+    let mut queue = queue.into_iter();
+    loop {
+        let group: Vec<Branch> = queue.by_ref().take(64).collect();
+        if group.is_empty() {
+            return all;
+        }
         let filled: Vec<Filled> = group
-            .par_iter()
-            .map(|(cube, near, incoming)| {
+            .into_par_iter()
+            .map(|branch| {
                 let mut leaves = Vec::new();
-                filler.descend(*cube, near.clone(), incoming.clone(), &mut leaves);
+                filler.descend(branch, &mut leaves);
                 let filled = filler.evaluate(leaves);
                 let n = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
                 progress(n as f64 / total);
@@ -128,14 +133,14 @@ pub(super) fn fill(
             })
             .collect();
         for (node, values) in filled.into_iter().flatten() {
-            nodes[node * per_node..(node + 1) * per_node].copy_from_slice(&values);
+            let first = node as usize * per_node;
+            all[first..first + per_node].copy_from_slice(&values);
         }
     }
-    nodes
 }
 
 impl<'a> Filler<'a> {
-    fn new(basis: &'a ElectrodeBasis, grid: Grid, needed: &'a [bool], accuracy: f64) -> Self {
+    fn new(basis: &'a ElectrodeBasis, grid: Grid, nodes: &'a [[usize; 3]], accuracy: f64) -> Self {
         let functions = basis.functions();
         let degree = degree_for(accuracy);
         let n = coefficients(degree);
@@ -173,15 +178,15 @@ impl<'a> Filler<'a> {
             .collect();
         let at_node = (0..PER_NODE).map(|k| derivative_weights(&Vec3::zeros(), NODE_DEGREE, orders(k))).collect();
         let pieces = Pieces::new(basis);
-        Self { grid, needed, pieces, functions, accuracy, degree, handed_down, derivatives, at_node, arch: Arch::new() }
+        Self { grid, nodes, pieces, functions, accuracy, degree, handed_down, derivatives, at_node, arch: Arch::new() }
     }
 
-    /// Adds far panels to the box's expansion and returns the near ones, those as large as the box cut into pieces.
-    fn take_far(&self, cube: &Cube, near: Vec<Piece>, mut expansion: Mat<f64>) -> (Mat<f64>, Vec<Piece>) {
+    /// Adds far panels to the box's expansion and keeps the near ones, those as large as the box cut into pieces.
+    fn take_far(&self, branch: Branch) -> Branch {
+        let Branch { cube, near: mut pending, mut expansion, nodes } = branch;
         let (center, radius) = (cube.center(&self.grid), cube.radius(&self.grid));
         let mut gather = Gather::new(self.functions);
         let mut left = Vec::new();
-        let mut pending = near;
         while let Some(piece) = pending.pop() {
             let distance = (piece.center - center).norm();
             let far = distance - piece.radius > FAR * radius;
@@ -208,48 +213,53 @@ impl<'a> Filler<'a> {
                 }
             }
         }
-        (expansion, left)
+        Branch { cube, near: left, expansion, nodes }
     }
 
-    /// The eight parts of a box that hold nodes, with what is handed down to them.
-    fn parts(&self, cube: &Cube, near: &[Piece], expansion: &Mat<f64>) -> Vec<(Cube, Vec<Piece>, Mat<f64>)> {
-        let half = cube.edge / 2;
-        (0..8)
-            .filter_map(|part| {
-                let first = std::array::from_fn(|k| cube.first[k] + (part >> k & 1) * half);
-                let inside = (0..3).all(|k| first[k] < self.grid.cells[k]);
-                let handed = || product(self.handed_down[part].as_ref(), expansion.as_ref());
-                inside.then(|| (Cube { first, edge: half }, near.to_vec(), handed()))
+    /// The parts of a box that hold nodes, with what is handed down to them.
+    fn parts(&self, branch: &Branch) -> Vec<Branch> {
+        let (first, half) = (branch.cube.first, branch.cube.edge / 2);
+        let mut nodes: [Vec<u32>; 8] = Default::default();
+        for &node in &branch.nodes {
+            let at = self.nodes[node as usize];
+            nodes[(0..3).map(|k| usize::from(at[k] >= first[k] + half) << k).sum::<usize>()].push(node);
+        }
+        let parts = nodes.into_iter().enumerate().filter(|(_, nodes)| !nodes.is_empty());
+        parts
+            .map(|(part, nodes)| Branch {
+                cube: Cube { first: std::array::from_fn(|k| first[k] + (part >> k & 1) * half), edge: half },
+                near: branch.near.clone(),
+                expansion: product(self.handed_down[part].as_ref(), branch.expansion.as_ref()),
+                nodes,
             })
             .collect()
     }
 
-    fn descend(&self, cube: Cube, near: Vec<Piece>, incoming: Mat<f64>, leaves: &mut Vec<Leaf>) {
-        if self.nodes_of(&cube).is_empty() {
-            return;
-        }
-        let (expansion, near) = self.take_far(&cube, near, incoming);
-        if cube.edge > LEAF || (cube.edge > SMALLEST && !near.is_empty()) {
-            for (part, near, expansion) in self.parts(&cube, &near, &expansion) {
-                self.descend(part, near, expansion, leaves);
+    fn descend(&self, branch: Branch, leaves: &mut Vec<Branch>) {
+        let branch = self.take_far(branch);
+        let edge = branch.cube.edge;
+        if edge > LEAF || (edge > SMALLEST && !branch.near.is_empty()) {
+            for part in self.parts(&branch) {
+                self.descend(part, leaves);
             }
         } else {
-            leaves.push(Leaf { cube, expansion, near });
+            leaves.push(branch);
         }
     }
 
     /// Derivatives at the nodes of some leaves; leaves of one size share one product of matrices.
-    fn evaluate(&self, leaves: Vec<Leaf>) -> Filled {
+    fn evaluate(&self, leaves: Vec<Branch>) -> Filled {
         let mut filled = Filled::new();
         for (matrix, edge) in self.derivatives.iter().zip([LEAF, SMALLEST]) {
-            let same: Vec<&Leaf> = leaves.iter().filter(|leaf| leaf.cube.edge == edge).collect();
+            let same: Vec<&Branch> = leaves.iter().filter(|leaf| leaf.cube.edge == edge).collect();
             let k = self.functions;
             let expansions =
                 Mat::from_fn(coefficients(self.degree), same.len() * k, |i, c| same[c / k].expansion[(i, c % k)]);
             let all = product(matrix.as_ref(), expansions.as_ref());
             let width = edge + 1;
             for (number, leaf) in same.into_iter().enumerate() {
-                for index in self.nodes_of(&leaf.cube) {
+                for &node in &leaf.nodes {
+                    let index = self.nodes[node as usize];
                     let local: [usize; 3] = std::array::from_fn(|i| index[i] - leaf.cube.first[i]);
                     let row = (local[0] + width * (local[1] + width * local[2])) * PER_NODE;
                     let mut values = Vec::with_capacity(k * PER_NODE);
@@ -259,7 +269,7 @@ impl<'a> Filler<'a> {
                     if !leaf.near.is_empty() {
                         self.add_near(index, &leaf.near, &mut values);
                     }
-                    filled.push((self.grid.node(index), values));
+                    filled.push((node, values));
                 }
             }
         }
@@ -296,27 +306,6 @@ impl<'a> Filler<'a> {
                 values[k * PER_NODE + d] += derivative * unit;
             }
         }
-    }
-
-    /// The needed nodes that belong to a box: those on its lower faces and within, on its upper faces only where the table
-    /// ends.
-    fn nodes_of(&self, cube: &Cube) -> Vec<[usize; 3]> {
-        let range = |k: usize| {
-            let end = cube.first[k] + cube.edge;
-            let last = if end >= self.grid.cells[k] { self.grid.cells[k] } else { end - 1 };
-            cube.first[k]..=last
-        };
-        let mut nodes = Vec::new();
-        for z in range(2) {
-            for y in range(1) {
-                for x in range(0) {
-                    if self.needed[self.grid.node([x, y, z])] {
-                        nodes.push([x, y, z]);
-                    }
-                }
-            }
-        }
-        nodes
     }
 }
 

@@ -1,12 +1,21 @@
-//! Making a table to an accuracy: choosing its spacing and the layer it leaves to the exact sum, and measuring its error.
+//! Making a table to an accuracy: choosing its bricks and the layer it leaves to the exact sum.
+//!
+//! Large bricks come first. Those whose estimated error is too large are halved, or left to the exact sum next to conductors, until
+//! that layer is too thick; then its bricks are halved, too. In the end the error is measured against the exact sum, and where it
+//! is larger than estimated, more is halved.
+
+use std::collections::HashMap;
 
 use meshes::{SurfaceTree, Vec3};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::fill::fill;
-use super::{Grid, PotentialTable};
-use crate::{BasisField, ElectrodeBasis, PanelSum, Plane, Samples};
+use super::measure::{TableReport, measure};
+use super::octree::{Brick, MAX_LEVEL, NONE, Octree};
+use super::refine::{Quality, quality, rescale};
+use super::spline::Splines;
+use super::{CELLS_PER_BRICK, Grid, PER_NODE, PotentialTable};
+use crate::{ElectrodeBasis, PanelSum, Plane};
 
 /// What is wanted of a table.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,7 +27,7 @@ pub struct TableOptions {
     /// Largest error of the field, as a fraction of the strongest field in the table; the potential is held to a tenth of it, as
     /// a fraction of the unit excitation.
     pub accuracy: f64,
-    /// Size of a cell, m; `None`: chosen so that the accuracy is reached.
+    /// Size of a cell, m, the same everywhere; `None`: chosen so that the accuracy is reached, smaller where the field needs it.
     pub spacing: Option<f64>,
     /// Bytes that may be used. A spacing that is given is refused when it needs more; one that is chosen stops shrinking.
     pub max_bytes: u64,
@@ -45,63 +54,33 @@ pub enum TableError {
     },
 }
 
-/// What a table is like.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct TableReport {
-    /// Number of nodes.
-    pub nodes: usize,
-    /// Bytes it takes.
-    pub bytes: u64,
-    /// Mean size of a cell, m.
-    pub spacing: f64,
-    /// Fraction of the cells outside of conductors that are interpolated; the others are left to the exact sum.
-    pub tabulated_fraction: f64,
-    /// Cells between a conductor and the nearest interpolated cell.
-    pub layer: f64,
-    /// Largest error of the potential at points between the nodes, as a fraction of the unit excitation.
-    pub potential_error: f64,
-    /// Largest error of the field there, as a fraction of the strongest field in interpolated cells.
-    pub field_error: f64,
-    /// Largest |Laplacian| of the interpolant at points between the nodes, times spacing, as a fraction of the strongest
-    /// field: zero for an exact potential.
-    pub laplacian: f64,
-    /// Points at which the error was measured.
-    pub error_points: usize,
-}
+/// Nearest interpolated bricks may come this close to a conductor, in bricks.
+const NEAREST: f64 = 1.0;
 
-impl TableReport {
-    /// The error that counts against the accuracy asked for.
-    pub fn error(&self) -> f64 {
-        self.field_error.max(10.0 * self.potential_error)
-    }
-}
-
-/// Thickness, in cells, of the layer next to conductors that may be left to the exact sum.
-const LAYERS: [f64; 6] = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0];
-
-/// Thickest layer with which a spacing that is chosen is accepted; a finer grid with a thinner layer is faster to trace in.
+/// Bricks farther than this from conductors, in bricks, are never left to the exact sum for their error: they are halved.
 const THICKEST: f64 = 3.0;
 
-/// Cells along the longest side of the box to begin with.
-const FIRST_CELLS: f64 = 24.0;
+/// The same where the size of cells is given.
+const THICKEST_GIVEN: f64 = 2.0;
 
-/// The clearance of a cell inside a conductor, where no table is needed.
-const INSIDE: f64 = -1.0;
+/// The clearance of a brick inside a conductor or below a grounded plane, where no table is needed.
+const INSIDE: f32 = -1.0;
 
-/// The layer, in cells, that is left to the exact sum at the usual accuracies.
-const USUAL_LAYER: f64 = 1.5;
+/// Bricks along the longest side of the box to begin with.
+const FIRST_BRICKS: f64 = 12.0;
 
-/// Fraction of the cells outside of conductors that are to be interpolated, as long as the table stays small. A point in one of
-/// the others takes some eight times as long as an interpolated one (`field/benches`).
+/// Fraction of the space outside of conductors that is to be interpolated, as long as the table stays small. A point beside a
+/// conductor takes some hundred times as long as an interpolated one (`field/benches`).
 const WIDE: f64 = 0.85;
 
-/// Nodes times basis functions above which that is no longer asked for: some 20 MB.
+/// Points of interest that are to lie in interpolated bricks: all but what is next to a conductor anyway.
+const COVERED: f64 = 0.9;
+
+/// Nodes times basis functions above which no bricks are halved for those two reasons.
 const WIDE_NODES: usize = 100_000;
 
-/// Points at which the error is measured, for each thickness of layer. The largest error of 400 points misses the largest of
-/// all by a factor of about two where the error falls steeply with distance from a conductor; the worst cells are the
-/// nearest ones, and those are drawn as often as all others together.
-const POINTS: usize = 400;
+/// Times that the estimated errors are corrected by the measured one.
+const CORRECTIONS: usize = 4;
 
 /// Tabulates all basis functions.
 ///
@@ -115,12 +94,8 @@ pub fn tabulate(
     tabulate_around(basis, options, &[], progress)
 }
 
-/// Points of interest that are to lie in interpolated cells, where the spacing is chosen: all but what is next to a conductor
-/// anyway.
-const COVERED: f64 = 0.9;
-
-/// As [`tabulate`], with a spacing so small that the table holds most points of interest (where grains start, say): a cell next
-/// to a conductor is left to the exact sum, which takes some eight times as long (`field/benches`).
+/// As [`tabulate`], with bricks so small that the table holds most points of interest (where grains start, say): what is next to a
+/// conductor is left to the exact sum, which takes some hundred times as long (`field/benches`).
 ///
 /// # Errors
 /// As [`tabulate`].
@@ -130,260 +105,333 @@ pub fn tabulate_around(
     interest: &[Vec3],
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<(PotentialTable, TableReport), TableError> {
-    tabulate_from(basis, options, starting_spacing(basis, options, interest)?, progress)
-}
-
-/// Nodes of a grid of that spacing, and bytes to fill it.
-fn bytes_for(options: &TableOptions, functions: usize, spacing: f64) -> (usize, u64) {
-    let nodes = Grid::new(options.min, options.max, spacing).nodes();
-    (nodes, PotentialTable::bytes_while_filling(nodes, functions))
-}
-
-/// The spacing that [`tabulate_around`] begins with, m: all that its table knows of the points of interest.
-///
-/// # Errors
-/// As [`tabulate`].
-pub fn starting_spacing(basis: &ElectrodeBasis, options: &TableOptions, interest: &[Vec3]) -> Result<f64, TableError> {
-    let functions = basis.functions();
     let longest = (options.max - options.min).max();
-    let bytes = |spacing: f64| bytes_for(options, functions, spacing);
-    let spacing = options.spacing.unwrap_or(longest / FIRST_CELLS);
-    let (nodes, needed) = bytes(spacing);
+    let spacing = options.spacing.unwrap_or(longest / FIRST_BRICKS / CELLS_PER_BRICK as f64);
+    let functions = basis.functions();
+    let bytes = |spacing: f64| {
+        let bricks = PotentialTable::bricks_for(options.min, options.max, spacing);
+        (bricks, PotentialTable::bytes_while_filling(&bricks, functions))
+    };
+    let (grid, needed) = bytes(spacing);
     if needed > options.max_bytes {
         let mut fits = spacing;
         while bytes(fits).1 > options.max_bytes && fits < longest {
             fits *= 1.05;
         }
         return Err(TableError::TooLarge {
-            nodes: nodes as u64,
+            nodes: grid.nodes() as u64,
             functions,
             needed,
             available: options.max_bytes,
             spacing_that_fits: fits,
         });
     }
-    if options.spacing.is_some() {
-        return Ok(spacing);
-    }
-    let fits = |spacing: f64| bytes(spacing).1 <= options.max_bytes;
-    Ok(wide_spacing(options, spacing, functions, interest, basis, fits))
-}
-
-/// As [`tabulate`], beginning with a spacing (m) that [`starting_spacing`] gave.
-///
-/// # Errors
-/// As [`tabulate`].
-pub fn tabulate_from(
-    basis: &ElectrodeBasis,
-    options: &TableOptions,
-    mut spacing: f64,
-    progress: &(dyn Fn(f64) + Sync),
-) -> Result<(PotentialTable, TableReport), TableError> {
-    let functions = basis.functions();
-    let exact = basis.panel_sum();
-    loop {
-        let grid = Grid::new(options.min, options.max, spacing);
-        let clearance = clearances(&grid, exact.tree(), basis.ground.as_ref());
-        let needed = needed_nodes(&grid, &clearance);
-        let nodes = fill(basis, grid, &needed, options.accuracy, progress);
-        let everywhere = clearance.iter().map(|c| *c >= LAYERS[0]).collect();
-        let mut table = PotentialTable { grid, channels: functions, nodes, tabulated: everywhere };
-        let measured = measure(&table, &clearance, &exact, basis.mesh.electrodes.len());
-        let (layer, mut report) = measured
-            .iter()
-            .find(|(_, r)| r.error() <= options.accuracy)
-            .or(measured.last())
-            .map_or((LAYERS[0], TableReport::default()), |(layer, report)| (*layer, *report));
-        table.tabulated = clearance.iter().map(|c| *c >= layer).collect();
-        report.nodes = grid.nodes();
-        report.bytes = table.bytes();
-        report.spacing = grid.spacing().mean();
-        report.layer = layer;
-        let kept = table.tabulated.iter().filter(|t| **t).count();
-        let free = clearance.iter().filter(|c| **c > INSIDE).count();
-        report.tabulated_fraction = kept as f64 / free.max(1) as f64;
-        let good = report.error() <= options.accuracy && layer <= THICKEST;
-        // The error of the field falls with the fifth power of the spacing; a fifth to two fifths less at a time.
-        let wanted = (options.accuracy / report.error().max(f64::MIN_POSITIVE)).powf(0.2);
-        let next = spacing * wanted.clamp(0.6, 0.8);
-        if good || options.spacing.is_some() || bytes_for(options, functions, next).1 > options.max_bytes {
-            return Ok((table, report));
-        }
-        spacing = next;
-    }
-}
-
-/// A spacing at which most of the space between conductors, and most points of interest, are so far from conductors that they
-/// will be interpolated; not so small that the table becomes large for that alone.
-fn wide_spacing(
-    options: &TableOptions,
-    first: f64,
-    functions: usize,
-    interest: &[Vec3],
-    basis: &ElectrodeBasis,
-    fits: impl Fn(f64) -> bool,
-) -> f64 {
-    let tree = SurfaceTree::new(&basis.mesh);
-    let mut spacing = first;
-    loop {
-        let grid = Grid::new(options.min, options.max, spacing);
-        let clearance = clearances(&grid, &tree, basis.ground.as_ref());
-        let free = clearance.iter().filter(|c| **c > INSIDE).count();
-        let kept = clearance.iter().filter(|c| **c >= USUAL_LAYER).count();
-        let in_box: Vec<usize> = interest.iter().filter_map(|p| grid.locate(p)).map(|(at, _)| grid.cell(at)).collect();
-        let held = in_box.iter().filter(|cell| clearance[**cell] >= USUAL_LAYER).count();
-        let wide = kept as f64 >= WIDE * free as f64 && held as f64 >= COVERED * in_box.len() as f64;
-        let next = 0.8 * spacing;
-        let large = Grid::new(options.min, options.max, next).nodes() * functions > WIDE_NODES;
-        if wide || large || !fits(next) {
-            return spacing;
-        }
-        spacing = next;
-    }
-}
-
-/// Distance of each cell from the nearest conductor, in cells; zero where it cuts one, [`INSIDE`] where it lies within.
-fn clearances(grid: &Grid, tree: &SurfaceTree, ground: Option<&Plane>) -> Vec<f64> {
-    let spacing = grid.spacing();
-    let (size, half) = (spacing.max(), 0.5 * spacing.norm());
-    let reach = (LAYERS[LAYERS.len() - 1] + 1.0) * size + half;
-    (0..grid.cell_count())
-        .into_par_iter()
-        .map(|cell| {
-            let center = grid.point(grid.cell_indices(cell).map(|i| i as f64 + 0.5));
-            // Wholly below the grounded plane.
-            if ground.is_some_and(|plane| plane.height(&center) < -half) {
-                return INSIDE;
-            }
-            match tree.nearest(&center, reach) {
-                Some(nearest) if nearest.distance <= half => 0.0,
-                // Nothing is cut: the whole cell is inside where its centre is.
-                _ if tree.inside(&center).is_some() => INSIDE,
-                Some(nearest) => (nearest.distance - half) / size,
-                None => (reach - half) / size,
-            }
-        })
-        .collect()
-}
-
-/// Nodes of cells that may be interpolated.
-fn needed_nodes(grid: &Grid, clearance: &[f64]) -> Vec<bool> {
-    let mut needed = vec![false; grid.nodes()];
-    for (cell, _) in clearance.iter().enumerate().filter(|(_, c)| **c >= LAYERS[0]) {
-        let [i, j, k] = grid.cell_indices(cell);
-        for corner in 0..8 {
-            needed[grid.node([i + (corner & 1), j + (corner >> 1 & 1), k + (corner >> 2)])] = true;
-        }
-    }
-    needed
-}
-
-/// The error of the table for each thickness of layer, at points drawn from the cells beyond it: half of them from the cells
-/// next to the layer.
-fn measure(table: &PotentialTable, clearance: &[f64], exact: &PanelSum, electrodes: usize) -> Vec<(f64, TableReport)> {
-    let n = table.channels;
-    let mut next = sequence();
-    // Points, each with the clearance of its cell.
-    let mut drawn: Vec<(f64, Vec3)> = Vec::new();
-    let mut draw = |cells: &[usize]| {
-        for _ in 0..POINTS / 2 {
-            if cells.is_empty() {
-                break;
-            }
-            let cell = cells[(next() * cells.len() as f64) as usize];
-            let [i, j, k] = table.grid.cell_indices(cell).map(|i| i as f64);
-            drawn.push((clearance[cell], table.grid.point([i + next(), j + next(), k + next()])));
-        }
+    let mut maker = Maker {
+        basis,
+        options,
+        interest,
+        exact: basis.panel_sum(),
+        table: PotentialTable { octree: Octree::new(grid), channels: functions, nodes: Vec::new() },
+        ids: HashMap::new(),
+        clearance: Vec::new(),
+        quality: Vec::new(),
+        severity: 1.0,
+        fills: 0,
+        progress,
     };
-    for (index, &layer) in LAYERS.iter().enumerate() {
-        let thicker = LAYERS.get(index + 1).copied().unwrap_or(f64::INFINITY);
-        let band = |from: f64, to: f64| -> Vec<usize> {
-            (0..clearance.len()).filter(|&c| clearance[c] >= from && clearance[c] < to).collect()
-        };
-        draw(&band(layer, thicker));
-    }
-    let all: Vec<usize> = (0..clearance.len()).filter(|&c| clearance[c] >= LAYERS[0]).collect();
-    draw(&all);
-    struct Error {
-        clearance: f64,
-        potential: Vec<f64>,
-        height: Vec<f64>,
-        field: Vec<f64>,
-        strength: Vec<f64>,
-        laplacian: Vec<f64>,
-    }
-    let size = table.grid.spacing().max();
-    drawn.retain(|(_, point)| !exact.below_ground(point));
-    let errors: Vec<Error> = drawn
-        .par_iter()
-        .map(|(clearance, point)| {
-            let mut samples = Samples::default();
-            exact.sample(std::slice::from_ref(point), &mut samples);
-            let (mut potential, mut gradient) = (vec![0.0; n], vec![Vec3::zeros(); n]);
-            table.add(point, &mut potential, &mut gradient);
-            exact.add_sources(point, &mut potential, &mut gradient);
-            let difference = |c: usize| (gradient[c] - samples.gradient[c]).norm();
-            Error {
-                clearance: *clearance,
-                potential: (0..n).map(|c| (potential[c] - samples.potential[c]).abs()).collect(),
-                // An electrode at 1 V; a source by the largest potential it makes.
-                height: (0..n).map(|c| if c < electrodes { 1.0 } else { samples.potential[c].abs() }).collect(),
-                field: (0..n).map(difference).collect(),
-                strength: samples.gradient.iter().map(|g| g.norm()).collect(),
-                laplacian: laplacians(table, point, 1e-3 * size),
-            }
-        })
-        .collect();
-    LAYERS
-        .iter()
-        .map(|&layer| {
-            let beyond: Vec<&Error> = errors.iter().filter(|e| e.clearance >= layer).collect();
-            let largest = |of: &dyn Fn(&Error) -> f64| beyond.iter().map(|e| of(e)).fold(0.0, f64::max);
-            // The worst channel, each against its own scale.
-            let relative = |of: &dyn Fn(&Error, usize) -> f64, scale: &dyn Fn(&Error, usize) -> f64| {
-                (0..n)
-                    .map(|c| largest(&|e| of(e, c)) / largest(&|e| scale(e, c)).max(f64::MIN_POSITIVE))
-                    .fold(0.0, f64::max)
-            };
-            let report = TableReport {
-                potential_error: relative(&|e, c| e.potential[c], &|e, c| e.height[c]),
-                field_error: relative(&|e, c| e.field[c], &|e, c| e.strength[c]),
-                laplacian: size * relative(&|e, c| e.laplacian[c].abs(), &|e, c| e.strength[c]),
-                error_points: beyond.len(),
-                ..TableReport::default()
-            };
-            (layer, report)
-        })
-        .collect()
+    maker.fill_new();
+    Ok(maker.finished())
 }
 
-/// Laplacian of the interpolant of each channel, by differences of its gradient over `step` (m), 1/m² per unit.
-fn laplacians(table: &PotentialTable, point: &Vec3, step: f64) -> Vec<f64> {
-    let n = table.channels;
-    let mut sum = vec![0.0; n];
-    for axis in 0..3 {
-        let side = |sign: f64| {
-            let (mut potential, mut gradient) = (vec![0.0; n], vec![Vec3::zeros(); n]);
-            let moved = point + Vec3::ith(axis, sign * step);
-            table.add(&moved, &mut potential, &mut gradient).then_some(gradient)
+/// The points of interest that can make a difference to [`tabulate_around`]: those near conductors.
+pub fn points_near_conductors(basis: &ElectrodeBasis, options: &TableOptions, points: &[Vec3]) -> Vec<Vec3> {
+    let first = (options.max - options.min).max() / FIRST_BRICKS;
+    // The farthest point of a brick of which some point is within its own distance from a conductor.
+    let reach = (NEAREST + 2.0 * 3.0_f64.sqrt()) * first;
+    let tree = SurfaceTree::new(&basis.mesh);
+    points.iter().copied().filter(|p| tree.nearest(p, reach).is_some()).collect()
+}
+
+/// A table in the making.
+struct Maker<'a> {
+    basis: &'a ElectrodeBasis,
+    options: &'a TableOptions,
+    interest: &'a [Vec3],
+    exact: PanelSum,
+    table: PotentialTable,
+    /// The number of the node at a place.
+    ids: HashMap<[u32; 3], u32>,
+    /// For each brick its distance from the nearest conductor in bricks; zero where it is cut, [`INSIDE`] within.
+    clearance: Vec<f32>,
+    /// For each brick with known corners its quality for each function.
+    quality: Vec<Vec<Quality>>,
+    /// By how much errors are larger than estimated.
+    severity: f64,
+    /// Times that nodes were filled.
+    fills: i32,
+    progress: &'a (dyn Fn(f64) + Sync),
+}
+
+impl Maker<'_> {
+    /// Fills the bricks that came last.
+    fn fill_new(&mut self) {
+        let first = self.clearance.len();
+        let (tree, ground) = (self.exact.tree(), self.basis.ground.as_ref());
+        let octree = &self.table.octree;
+        let new: Vec<f32> =
+            octree.all()[first..].par_iter().map(|brick| clearance(octree, brick, tree, ground)).collect();
+        self.clearance.extend(new);
+        let count = self.clearance.len();
+        let mut levels: Vec<u8> = self.table.octree.all()[first..].iter().map(|brick| brick.level).collect();
+        levels.sort_unstable();
+        levels.dedup();
+        for level in levels {
+            let is_new = |number: &usize| {
+                let brick = &self.table.octree.all()[*number];
+                brick.level == level && f64::from(self.clearance[*number]) >= NEAREST
+            };
+            let new: Vec<usize> = (first..count).filter(is_new).collect();
+            let bricks: Vec<Brick> = new.iter().map(|n| self.table.octree.all()[*n]).collect();
+            let down = MAX_LEVEL - level;
+            let grid = self.table.octree.grid_of(level);
+            let corners = bricks.iter().flat_map(|brick| (0..8).map(|c| brick.corner(c)));
+            self.fill_nodes(corners.collect(), grid, down);
+            for number in new {
+                let brick = self.table.octree.brick_mut(number);
+                brick.corners = std::array::from_fn(|c| self.ids[&brick.corner(c)]);
+            }
+        }
+        let quality: Vec<Vec<Quality>> = (first..count).into_par_iter().map(|n| self.quality_of(n)).collect();
+        self.quality.extend(quality);
+    }
+
+    /// Makes sure that nodes at these places are known. They are nodes of a grid: place = index · 2^`down`.
+    fn fill_nodes(&mut self, mut places: Vec<[u32; 3]>, grid: Grid, down: u8) {
+        places.retain(|place| !self.ids.contains_key(place));
+        places.sort_unstable();
+        places.dedup();
+        if places.is_empty() {
+            return;
+        }
+        let index = |place: &[u32; 3]| place.map(|i| (i >> down) as usize);
+        let nodes: Vec<[usize; 3]> = places.iter().map(index).collect();
+        // How many times more there will be is not known: each takes half of what is left of the bar.
+        let from = 1.0 - 0.5_f64.powi(self.fills);
+        let mut new = fill(self.basis, grid, &nodes, self.options.accuracy, &|done| {
+            (self.progress)(from + 0.5 * (1.0 - from) * done);
+        });
+        self.fills += 1;
+        let size = self.table.octree.size(MAX_LEVEL - down).x / self.table.octree.size(0).x;
+        rescale(&mut new, size);
+        let known = self.ids.len() as u32;
+        self.ids.extend(places.into_iter().zip(known..));
+        self.table.nodes.extend(new);
+    }
+
+    fn quality_of(&self, number: usize) -> Vec<Quality> {
+        let octree = &self.table.octree;
+        let brick = &octree.all()[number];
+        if !brick.is_filled() {
+            return Vec::new();
+        }
+        let n = self.table.channels;
+        let of = |node: u32, c: usize| {
+            let first = (node as usize * n + c) * PER_NODE;
+            &self.table.nodes[first..first + PER_NODE]
         };
-        let (Some(above), Some(below)) = (side(1.0), side(-1.0)) else { return vec![0.0; n] };
-        for c in 0..n {
-            sum[c] += (above[c][axis] - below[c][axis]) / (2.0 * step);
+        let (size, edges) = (0.5_f64.powi(i32::from(brick.level)), octree.size(brick.level).into());
+        (0..n).map(|c| quality(&brick.corners.map(|node| of(node, c)), size, edges)).collect()
+    }
+
+    /// Marks the bricks that are good enough to be interpolated.
+    fn mark(&mut self) {
+        let thickest = if self.options.spacing.is_some() { THICKEST_GIVEN } else { THICKEST };
+        let electrodes = self.basis.mesh.electrodes.len();
+        // What errors are measured against: the strongest field and the largest potential in interpolated bricks. Fewer bricks
+        // have less of both, so begin with all.
+        let mut scales = self.scales(electrodes, |_| true);
+        for _ in 0..3 {
+            let good = |number: usize| {
+                f64::from(self.clearance[number]) >= thickest || self.error(number, &scales) <= self.options.accuracy
+            };
+            let kept: Vec<bool> = (0..self.quality.len()).map(|n| !self.quality[n].is_empty() && good(n)).collect();
+            scales = self.scales(electrodes, |n| kept[n]);
+            for (number, kept) in kept.into_iter().enumerate() {
+                let whole = !self.table.octree.all()[number].is_halved();
+                self.table.octree.brick_mut(number).tabulated = whole && kept;
+            }
         }
     }
-    sum
+
+    /// For each function potential and field against which errors in the interpolated bricks are measured.
+    fn scales(&self, electrodes: usize, kept: impl Fn(usize) -> bool) -> Vec<[f64; 2]> {
+        let own = || self.table.octree.whole().map(|(n, _)| n).filter(|n| !self.quality[*n].is_empty() && kept(*n));
+        (0..self.table.channels)
+            .map(|c| {
+                let height = own().map(|n| self.quality[n][c].height).fold(f64::MIN_POSITIVE, f64::max);
+                let strength = own().map(|n| self.quality[n][c].strength).fold(f64::MIN_POSITIVE, f64::max);
+                [if c < electrodes { 1.0 } else { height }, strength]
+            })
+            .collect()
+    }
+
+    /// The estimated error of a brick that counts against the accuracy.
+    fn error(&self, number: usize, scales: &[[f64; 2]]) -> f64 {
+        let errors = self.quality[number].iter().zip(scales);
+        let worst = errors.map(|(q, [height, strength])| f64::max(q.field / strength, 10.0 * q.potential / height));
+        self.severity * worst.fold(0.0, f64::max)
+    }
+
+    /// Halves bricks that are not good enough, and those that hold too much of the space; whether there were any.
+    fn refined(&mut self) -> bool {
+        self.mark();
+        let marked = self.too_large();
+        if self.halve(marked, usize::MAX) {
+            return true;
+        }
+        let marked = self.too_wide();
+        self.halve(marked, WIDE_NODES / self.table.channels.max(1))
+    }
+
+    /// Whether a brick may be halved.
+    fn can_be_halved(&self, number: usize) -> bool {
+        self.table.octree.all()[number].level < MAX_LEVEL
+    }
+
+    /// Bricks away from conductors whose error is too large, the worst first.
+    fn too_large(&self) -> Vec<usize> {
+        let octree = &self.table.octree;
+        let scales = self.scales(self.basis.mesh.electrodes.len(), |n| octree.all()[n].tabulated);
+        let far = |n: usize| f64::from(self.clearance[n]) >= THICKEST && !self.quality[n].is_empty();
+        let candidates = octree.whole().map(|(n, _)| n).filter(|n| far(*n) && self.can_be_halved(*n));
+        let errors = candidates.map(|n| (self.error(n, &scales), n));
+        let mut bad: Vec<(f64, usize)> = errors.filter(|(error, _)| *error > self.options.accuracy).collect();
+        bad.sort_by(|a, b| b.0.total_cmp(&a.0));
+        bad.into_iter().map(|(_, n)| n).collect()
+    }
+
+    /// Bricks that are left to the exact sum, if that is too much of the space, or those of them that hold points of interest.
+    fn too_wide(&self) -> Vec<usize> {
+        let octree = &self.table.octree;
+        let whole: Vec<usize> = octree.whole().map(|(n, _)| n).collect();
+        let can = |n: &usize| self.can_be_halved(*n);
+        let outside = |n: &usize| self.clearance[*n] > INSIDE;
+        let open = |n: &usize| outside(n) && !octree.all()[*n].tabulated;
+        let volume = |n: usize| octree.all()[n].volume() * if self.clearance[n] == 0.0 { 0.5 } else { 1.0 };
+        let free: f64 = whole.iter().copied().filter(outside).map(volume).sum();
+        let left: f64 = whole.iter().copied().filter(open).map(volume).sum();
+        let wide = left <= (1.0 - WIDE) * free;
+        let holders: Vec<usize> = self.interest.iter().filter_map(|p| octree.locate(p)).map(|(n, _)| n).collect();
+        let held = holders.iter().filter(|n| octree.all()[**n].tabulated).count();
+        if !wide {
+            whole.iter().copied().filter(|n| can(n) && open(n)).collect()
+        } else if (held as f64) < COVERED * holders.len() as f64 {
+            let mut holders: Vec<usize> = holders.into_iter().filter(|n| can(n) && open(n)).collect();
+            holders.sort_unstable();
+            holders.dedup();
+            holders
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// Halves bricks and what has to be halved with them, as many of them, from the first on, as there is room for; whether there
+    /// were any.
+    fn halve(&mut self, mut marked: Vec<usize>, most_nodes: usize) -> bool {
+        while !marked.is_empty() {
+            let mut all = marked.clone();
+            self.table.octree.balance(&mut all);
+            // Eight parts have 19 nodes of their own, most of them shared with neighbours.
+            let nodes = self.ids.len() + 10 * all.len();
+            let n = self.table.channels;
+            let bricks = self.table.octree.all().len() + 8 * all.len();
+            let bytes = (8 * PER_NODE * n * nodes) as u64 / 3 * 4 + Splines::bytes_for(bricks, n);
+            if nodes <= most_nodes && bytes <= self.options.max_bytes {
+                for number in all {
+                    self.table.octree.halve(number);
+                }
+                self.fill_new();
+                return true;
+            }
+            // For a wider table all or nothing: half of a layer is not thinner.
+            marked.truncate(if most_nodes < usize::MAX { 0 } else { marked.len() / 2 });
+        }
+        false
+    }
+
+    /// Halves bricks until the table is as good as asked.
+    fn finished(mut self) -> (PotentialTable, TableReport) {
+        let chosen = self.options.spacing.is_none();
+        let electrodes = self.basis.mesh.electrodes.len();
+        let mut correction = 0;
+        loop {
+            while chosen && self.refined() {}
+            self.mark();
+            let report = measure(&self.table, &self.clearance, &self.exact, electrodes);
+            let excess = report.error() / self.options.accuracy;
+            if excess <= 1.0 || correction == CORRECTIONS {
+                return self.closed(report);
+            }
+            correction += 1;
+            self.severity *= excess.clamp(1.5, 10.0);
+        }
+    }
+
+    /// The table without nodes that are no corners, and the rest of its report.
+    fn closed(mut self, mut report: TableReport) -> (PotentialTable, TableReport) {
+        let octree = &self.table.octree;
+        let kept = || octree.whole().filter(|(_, brick)| brick.tabulated);
+        let outside = |n: usize| self.clearance[n] > INSIDE;
+        let volume = |(n, brick): (usize, &Brick)| brick.volume() * if self.clearance[n] == 0.0 { 0.5 } else { 1.0 };
+        let free: f64 = octree.whole().filter(|(n, _)| outside(*n)).map(volume).sum();
+        report.tabulated_fraction = kept().map(volume).sum::<f64>() / free.max(f64::MIN_POSITIVE);
+        let cell = |level: Option<u8>| octree.size(level.unwrap_or(0)).mean() / CELLS_PER_BRICK as f64;
+        let levels = || kept().map(|(_, brick)| brick.level);
+        (report.spacing, report.finest_spacing) = (cell(levels().min()), cell(levels().max()));
+        let nearest = kept().map(|(n, _)| f64::from(self.clearance[n])).fold(f64::INFINITY, f64::min);
+        report.layer = if nearest.is_finite() { nearest * CELLS_PER_BRICK as f64 } else { 0.0 };
+        let per_node = PER_NODE * self.table.channels;
+        let mut new_ids = vec![NONE; self.ids.len()];
+        let mut nodes = Vec::new();
+        let mut count = 0;
+        for number in 0..self.table.octree.all().len() {
+            let brick = self.table.octree.brick_mut(number);
+            if brick.is_halved() {
+                brick.corners = [NONE; 8];
+            }
+            for corner in brick.corners.iter_mut().filter(|c| **c != NONE) {
+                let old = *corner as usize;
+                if new_ids[old] == NONE {
+                    new_ids[old] = count;
+                    count += 1;
+                    nodes.extend_from_slice(&self.table.nodes[old * per_node..(old + 1) * per_node]);
+                }
+                *corner = new_ids[old];
+            }
+        }
+        self.table.nodes = nodes;
+        report.nodes = count as usize;
+        report.bytes = self.table.bytes();
+        (self.table, report)
+    }
 }
 
-/// Numbers in [0, 1), always the same ones: the additive recurrence of the golden ratio (Weyl 1916), scrambled so that
-/// successive numbers are unrelated.
-fn sequence() -> impl FnMut() -> f64 {
-    let mut state = 0x2545_F491_4F6C_DD1D_u64;
-    move || {
-        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+/// Distance of a brick from the nearest conductor in bricks, as far as it matters; zero where it cuts one, [`INSIDE`] where it lies
+/// within.
+fn clearance(octree: &Octree, brick: &Brick, tree: &SurfaceTree, ground: Option<&Plane>) -> f32 {
+    let edges = octree.size(brick.level);
+    let center = octree.point(brick, [0.5; 3]);
+    let (size, half) = (edges.max(), 0.5 * edges.norm());
+    // A table is needed above the grounded plane only.
+    if ground.is_some_and(|plane| plane.height(&center) < -half) {
+        return INSIDE;
+    }
+    let reach = 8.0 * size + half;
+    match tree.nearest(&center, reach) {
+        Some(nearest) if nearest.distance <= half => 0.0,
+        // Nothing is cut: the whole brick is inside where its centre is.
+        _ if tree.inside(&center).is_some() => INSIDE,
+        Some(nearest) => ((nearest.distance - half) / size) as f32,
+        None => ((reach - half) / size) as f32,
     }
 }
