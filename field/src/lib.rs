@@ -102,7 +102,7 @@ pub use plane::Plane;
 pub use quadratic::{Quadratic, QuadraticField};
 pub use source::{Source, SourceKind};
 pub use table::{
-    Brick, CELLS_PER_BRICK, Grid, Octree, PER_NODE, PotentialTable, TableError, TableOptions, TableReport,
+    Brick, CELLS_PER_BRICK, Grid, Octree, PER_NODE, PotentialTable, SMOOTH, TableError, TableOptions, TableReport,
     TabulatedField, points_near_conductors, tabulate, tabulate_around,
 };
 pub use waveform::{Waveform, WaveformPart};

@@ -47,6 +47,8 @@ pub struct PotentialTable {
     pub octree: Octree,
     /// Number of functions.
     pub channels: usize,
+    /// Accuracy of the field that was asked for; from [`SMOOTH`] on splines are of degree five.
+    pub accuracy: f64,
     /// Potential and derivatives at the nodes, in units of the coarsest bricks: entry `(node * channels + channel) * 27 + a + 3 b + 9 c`
     /// is ∂_x^a ∂_y^b ∂_z^c.
     pub nodes: Vec<f64>,
@@ -56,12 +58,22 @@ impl PotentialTable {
     /// A table of given derivatives, all bricks of one size and interpolated: `derivatives` gives for a point (m) the potential of
     /// each channel and its derivatives per metre, in the order of [`PotentialTable::nodes`]. The bricks are the cells of the
     /// grid.
-    pub fn of_function(grid: Grid, channels: usize, derivatives: impl Fn(&Vec3) -> Vec<[f64; PER_NODE]>) -> Self {
-        Self::of_bricks(Octree::new(grid), channels, derivatives)
+    pub fn of_function(
+        grid: Grid,
+        channels: usize,
+        accuracy: f64,
+        derivatives: impl Fn(&Vec3) -> Vec<[f64; PER_NODE]>,
+    ) -> Self {
+        Self::of_bricks(Octree::new(grid), channels, accuracy, derivatives)
     }
 
     /// As [`PotentialTable::of_function`], with given bricks.
-    fn of_bricks(mut octree: Octree, channels: usize, derivatives: impl Fn(&Vec3) -> Vec<[f64; PER_NODE]>) -> Self {
+    fn of_bricks(
+        mut octree: Octree,
+        channels: usize,
+        accuracy: f64,
+        derivatives: impl Fn(&Vec3) -> Vec<[f64; PER_NODE]>,
+    ) -> Self {
         let size = octree.size(0);
         let unit: [f64; PER_NODE] =
             std::array::from_fn(|d| (0..3).map(|k| size[k].powi((d / 3_usize.pow(k as u32) % 3) as i32)).product());
@@ -81,7 +93,7 @@ impl PotentialTable {
             let brick = octree.brick_mut(number);
             (brick.corners, brick.tabulated) = (corners, true);
         }
-        Self { octree, channels, nodes }
+        Self { octree, channels, accuracy, nodes }
     }
 
     /// Whether there are as many numbers as the bricks have nodes; a table that was read from somewhere may lie.
@@ -119,9 +131,10 @@ impl PotentialTable {
 
     /// Bytes that [`tabulate`] takes at its peak for a grid of bricks, and flights after it: what nodes hold, a third more for what
     /// is computed but not yet stored, and splines of all functions.
-    pub fn bytes_while_filling(bricks: &Grid, functions: usize) -> u64 {
+    pub fn bytes_while_filling(bricks: &Grid, functions: usize, accuracy: f64) -> u64 {
         let nodes = (8 * PER_NODE as u64 * functions as u64).saturating_mul(bricks.nodes() as u64);
-        let splines = Splines::bytes_for(bricks.cells.iter().fold(1, |n: usize, c| n.saturating_mul(*c)), functions);
+        let bricks = bricks.cells.iter().fold(1, |n: usize, c| n.saturating_mul(*c));
+        let splines = Splines::bytes_for(reach_for(accuracy), bricks, functions);
         (nodes / 3).saturating_mul(4).saturating_add(splines)
     }
 
@@ -129,6 +142,15 @@ impl PotentialTable {
     pub fn bricks_for(min: Vec3, max: Vec3, spacing: f64) -> Grid {
         Grid::new(min, max, CELLS_PER_BRICK as f64 * spacing)
     }
+}
+
+/// Accuracy of the field from which on splines are of degree five: they take two and a half times as long and as much memory, and
+/// where this much is asked cubic ones would need more than that many more bricks.
+pub const SMOOTH: f64 = 3e-5;
+
+/// What the splines of a table of that accuracy are.
+fn reach_for(accuracy: f64) -> usize {
+    if accuracy <= SMOOTH { spline::QUINTIC } else { spline::CUBIC }
 }
 
 /// A table with the exact sum for what it does not cover.
@@ -146,7 +168,7 @@ impl TabulatedField {
 
     /// A table's functions combined to channels, with what is exact for the same channels.
     pub fn new(table: &PotentialTable, weights: &[Vec<f64>], exact: Arc<PanelSum>) -> Self {
-        Self { kernel: Kernel::new(&table.octree, Splines::new(table, weights)), exact }
+        Self { kernel: Kernel::new(&table.octree, Splines::new(table, reach_for(table.accuracy), weights)), exact }
     }
 
     /// Bytes of the splines.

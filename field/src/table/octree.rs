@@ -132,13 +132,15 @@ impl Octree {
         Some(number)
     }
 
-    /// The 27 bricks around a brick and itself, of its own size or larger: entry `(x + 1) + 3 (y + 1) + 9 (z + 1)` lies x, y, z
-    /// bricks away.
-    pub(super) fn around(&self, brick: &Brick) -> [Option<usize>; 27] {
-        std::array::from_fn(|n| {
-            let step = [n % 3, n / 3 % 3, n / 9];
-            self.holder(brick.level, std::array::from_fn(|k| i64::from(brick.at[k]) + step[k] as i64 - 1))
-        })
+    /// The bricks around a brick, up to so many `steps` away, and itself, of its own size or larger: with n = 2 steps + 1 entry
+    /// `(x + steps) + n ((y + steps) + n (z + steps))` lies x, y, z bricks away.
+    pub(super) fn around(&self, brick: &Brick, steps: usize) -> Vec<Option<usize>> {
+        let side = 2 * steps + 1;
+        let at = |n: usize| {
+            let step = [n % side, n / side % side, n / (side * side)];
+            self.holder(brick.level, std::array::from_fn(|k| i64::from(brick.at[k]) + step[k] as i64 - steps as i64))
+        };
+        (0..side * side * side).map(at).collect()
     }
 
     /// The whole brick that holds a point, and where in it from 0 to 1; `None` outside the box.
@@ -170,7 +172,7 @@ impl Octree {
         while next < marked.len() {
             let brick = &self.bricks[marked[next]];
             next += 1;
-            for neighbour in self.around(brick).into_iter().flatten() {
+            for neighbour in self.around(brick, 1).into_iter().flatten() {
                 if self.bricks[neighbour].level < brick.level && !is_marked[neighbour] {
                     is_marked[neighbour] = true;
                     marked.push(neighbour);
@@ -234,7 +236,7 @@ mod tests {
         let tree = tree();
         assert!(tree.all().iter().any(|brick| brick.level == 2));
         for (_, brick) in tree.whole() {
-            for neighbour in tree.around(brick).into_iter().flatten() {
+            for neighbour in tree.around(brick, 1).into_iter().flatten() {
                 assert!(tree.all()[neighbour].level + 1 >= brick.level);
             }
         }

@@ -3,11 +3,11 @@
 //! Along one axis quintic Hermite interpolation is off by t³ (1 - t)³ ∂⁶φ/720 (in units of the brick). In the middle of an edge of
 //! the brick along that axis the polynomial's second derivative misses 0.375 ∂⁶φ/720, while those across the edge are interpolated
 //! along it and are off by far less. What the Laplacian of the polynomial is there, and an exact potential's is not, therefore
-//! tells the axis's error: a field off by 0.143 of it, a potential by 0.042. The splines' error follows from the polynomial's
-//! fourth derivative: t² (1 - t)² δ⁴ ∂⁴φ/24 in cells of size δ.
+//! tells the axis's error: a field off by 0.143 of it, a potential by 0.042. The error of cubic splines follows from the
+//! polynomial's fourth derivative: t² (1 - t)² δ⁴ ∂⁴φ/24 in cells of size δ.
 
 use super::hermite::{PER_NODE, at, basis, gather};
-use super::spline::CELLS;
+use super::spline::{CELLS, CUBIC};
 
 /// Largest slope of (t (1 - t))³ over its second derivative in the middle.
 const FIELD: f64 = 0.143;
@@ -15,10 +15,10 @@ const FIELD: f64 = 0.143;
 /// Its value there over the second derivative.
 const POTENTIAL: f64 = 0.042;
 
-/// Largest slope of (t (1 - t))²/24, times the cell's size to the third in bricks.
+/// Of cubic splines: largest slope of (t (1 - t))²/24, times the cell's size to the third in bricks.
 const SPLINE_FIELD: f64 = 0.00802 / (CELLS * CELLS * CELLS) as f64;
 
-/// Its largest value, times the cell's size to the fourth.
+/// Of cubic splines: its largest value, times the cell's size to the fourth.
 const SPLINE_POTENTIAL: f64 = 1.0 / 384.0 / (CELLS * CELLS * CELLS * CELLS) as f64;
 
 /// What is known of a function in a brick.
@@ -36,7 +36,8 @@ pub(super) struct Quality {
 
 /// The quality of a brick for one function: what it has at its corners in units in which the brick has this `size`, and its
 /// edges, m.
-pub(super) fn quality(corners: &[&[f64]; 8], size: f64, edges: [f64; 3]) -> Quality {
+pub(super) fn quality(corners: &[&[f64]; 8], size: f64, edges: [f64; 3], reach: usize) -> Quality {
+    let cubic = if reach == CUBIC { 1.0 } else { 0.0 };
     let polynomial = gather(corners, size);
     let derivative =
         |place: [f64; 3], order: [usize; 3]| at(&polynomial, &std::array::from_fn(|k| basis(place[k], order[k])));
@@ -56,8 +57,8 @@ pub(super) fn quality(corners: &[&[f64]; 8], size: f64, edges: [f64; 3]) -> Qual
                 fourth = fourth.max(derivative(middle, along(axis, 4)).abs());
             }
         }
-        squared += ((FIELD * missed + SPLINE_FIELD * fourth) / edge).powi(2);
-        quality.potential += POTENTIAL * missed + SPLINE_POTENTIAL * fourth;
+        squared += ((FIELD * missed + cubic * SPLINE_FIELD * fourth) / edge).powi(2);
+        quality.potential += POTENTIAL * missed + cubic * SPLINE_POTENTIAL * fourth;
     }
     quality.field = squared.sqrt();
     for corner in corners {
@@ -99,7 +100,7 @@ mod tests {
             let corners: Vec<Vec<f64>> =
                 (0..8).map(|c| node(rates, [c & 1, c >> 1 & 1, c >> 2].map(f64::from))).collect();
             let corners: [&[f64]; 8] = std::array::from_fn(|c| corners[c].as_slice());
-            let told = quality(&corners, 1.0, [1.0; 3]);
+            let told = quality(&corners, 1.0, [1.0; 3], CUBIC);
             // The polynomial alone, on a grid of points; the spline's part from the fourth derivative's bound.
             let polynomial = gather(&corners, 1.0);
             let (mut potential, mut field) = (0.0_f64, 0.0_f64);

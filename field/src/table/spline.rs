@@ -1,15 +1,17 @@
-//! What is evaluated: cubic B-splines on 4 x 4 x 4 cells in each brick.
+//! What is evaluated: B-splines on 4 x 4 x 4 cells in each brick, of degree three or five.
 //!
-//! *Why splines:* a point needs 4³ numbers of a channel against the 216 of the brick's polynomial, and each brick has them side by
-//! side. The coefficients follow from the polynomial, so that what is stored and filled stays as coarse as a field of degree
-//! five may be: where its error is 1e-4 at a distance of three and a half bricks from a conductor, that of splines on a quarter
-//! of its size is as large.
+//! *Why splines:* a point needs 4³ numbers of a channel (6³ for degree five) against the 216 of the brick's polynomial and 27 for
+//! each node, and each brick has them side by side. The coefficients follow from the polynomial, so that what is stored and filled
+//! stays as coarse as a field of degree five may be: where its error is 1e-4 at a distance of three and a half bricks from a
+//! conductor, that of cubic splines on a quarter of its size is as large. Where more is asked splines of degree five lose nothing
+//! against the polynomial.
 //!
-//! *Continuity:* bricks of one size share their coefficients, and potential, field and field gradient are continuous. A
-//! coefficient whose spline reaches into a larger brick follows from the larger one's splines by the two-scale relation
-//! B(x) = Σ_k 2^-3 C(4, k) B(2 x - k + 2), so that the same holds between bricks of different size. Checked by
-//! `bricks_join_smoothly`.
+//! *Continuity:* bricks of one size share their coefficients; potential and field have as many continuous derivatives as the degree
+//! allows (the field one, or three). A coefficient whose spline reaches into a larger brick follows from the larger one's splines
+//! by the two-scale relation B(x) = Σ_k 2^-d C(d + 1, k) B(2 x - k + (d + 1)/2), so that the same holds between bricks of
+//! different size. Checked by `bricks_join_smoothly`.
 
+use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use super::PotentialTable;
@@ -19,112 +21,142 @@ use super::octree::{Brick, NONE, Octree};
 /// Cells of a spline along the edge of a brick.
 pub(super) const CELLS: usize = 4;
 
-/// Coefficients along the edge of a brick: those at its five nodes and one beyond each end.
-pub(super) const EDGE: usize = CELLS + 3;
+/// Of degree three: splines reach two cells to both sides of their node.
+pub(super) const CUBIC: usize = 2;
 
-/// Rows of a brick: entry `y + 7 z`.
-pub(super) const ROWS: usize = EDGE * EDGE;
+/// Of degree five: they reach three cells.
+pub(super) const QUINTIC: usize = 3;
 
-/// For each place along an axis the neighbours (0 to 2) that hold its node, and the place that it has in them.
-const HOLDING: [&[(usize, usize)]; EDGE] =
-    [&[(0, 4)], &[(0, 5), (1, 1)], &[(1, 2)], &[(1, 3)], &[(1, 4)], &[(1, 5), (2, 1)], &[(2, 2)]];
+/// Coefficients along the edge of a brick: those at its five nodes and those beyond each end that reach into it.
+pub(super) const fn edge(reach: usize) -> usize {
+    CELLS + 2 * reach - 1
+}
 
-/// The same with those that have the node one beyond their end.
-const HOLDING_OR_BESIDE: [&[(usize, usize)]; EDGE] = [
-    &[(0, 4), (1, 0)],
-    &[(0, 5), (1, 1)],
-    &[(0, 6), (1, 2)],
-    &[(1, 3)],
-    &[(1, 4), (2, 0)],
-    &[(1, 5), (2, 1)],
-    &[(1, 6), (2, 2)],
-];
+/// Numbers of a row along x: coefficients and zeros, so many that whole vectors can be read from any cell on.
+pub(super) const fn stride(reach: usize) -> usize {
+    if reach == CUBIC { 8 } else { 12 }
+}
 
-/// Coefficients along x, the last of eight always zero: a line of memory.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[repr(align(64))]
-pub(super) struct Row(pub [f64; 8]);
+/// Numbers of a brick for one channel: rows `y + edge z`, in whole lines of memory.
+pub(super) const fn per_brick(reach: usize) -> usize {
+    (edge(reach) * edge(reach) * stride(reach)).next_multiple_of(8)
+}
+
+/// A line of memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub(super) struct Line([f64; 8]);
 
 /// Splines of all interpolated bricks.
 pub(super) struct Splines {
+    /// [`CUBIC`] or [`QUINTIC`].
+    pub reach: usize,
     /// Number of channels.
     pub channels: usize,
     /// Where each brick's numbers are, in bricks; [`NONE`] for bricks that are not interpolated.
     pub slots: Vec<u32>,
-    /// Coefficients: entry `(slot * channels + channel) * 49 + y + 7 z`.
-    pub rows: Vec<Row>,
+    lines: Vec<Line>,
 }
+
+/// Neighbours along an axis, from -2 to 2 bricks away, and the places that a node has in them.
+type Candidates = Vec<(usize, usize)>;
 
 impl Splines {
     /// Bytes of the splines of so many bricks and channels.
-    pub fn bytes_for(bricks: usize, channels: usize) -> u64 {
-        (size_of::<[Row; ROWS]>() as u64 * channels as u64).saturating_mul(bricks as u64)
+    pub fn bytes_for(reach: usize, bricks: usize, channels: usize) -> u64 {
+        (8 * per_brick(reach) as u64 * channels as u64).saturating_mul(bricks as u64)
+    }
+
+    /// Coefficients: entry `(slot * channels + channel) * per_brick + x + stride (y + edge z)`.
+    pub fn numbers(&self) -> &[f64] {
+        bytemuck::cast_slice(&self.lines)
     }
 
     /// The splines of combinations of a table's functions: channel c is Σ_k `weights[c][k]` times function k.
-    pub fn new(table: &PotentialTable, weights: &[Vec<f64>]) -> Self {
+    pub fn new(table: &PotentialTable, reach: usize, weights: &[Vec<f64>]) -> Self {
         let octree = &table.octree;
         let kept: Vec<usize> = octree.whole().filter(|(_, brick)| brick.tabulated).map(|(n, _)| n).collect();
         let mut slots = vec![NONE; octree.all().len()];
         kept.iter().enumerate().for_each(|(slot, &n)| slots[n] = slot as u32);
         let channels = weights.len();
-        let mut splines = Self { channels, slots, rows: Vec::new() };
-        let per_brick = channels * ROWS;
-        if per_brick == 0 {
+        let mut splines = Self { reach, channels, slots, lines: Vec::new() };
+        if channels == 0 {
             return splines;
         }
         let nodes = combined(table, weights);
-        let mut own = vec![Row::default(); kept.len() * per_brick];
-        let prefilter = prefilter();
-        own.par_chunks_mut(per_brick).zip(&kept).for_each(|(rows, &number)| {
+        let per_brick = per_brick(reach);
+        let empty = || vec![Line::default(); kept.len() * channels * per_brick / 8];
+        let mut own = empty();
+        let numbers: &mut [f64] = bytemuck::cast_slice_mut(&mut own);
+        let prefilter = prefilter(reach);
+        numbers.par_chunks_mut(channels * per_brick).zip(&kept).for_each(|(numbers, &number)| {
             let brick = &octree.all()[number];
-            for (channel, rows) in rows.chunks_exact_mut(ROWS).enumerate() {
+            for (channel, numbers) in numbers.chunks_exact_mut(per_brick).enumerate() {
                 let corners: [&[f64]; 8] = std::array::from_fn(|c| {
                     let first = (brick.corners[c] as usize * channels + channel) * PER_NODE;
                     &nodes[first..first + PER_NODE]
                 });
                 let size = 0.5_f64.powi(i32::from(brick.level));
-                coefficients(&gather(&corners, size), &prefilter, rows);
+                coefficients(&gather(&corners, size), &prefilter, reach, numbers);
             }
         });
-        let mut shared = vec![Row::default(); own.len()];
-        shared.par_chunks_mut(per_brick).zip(&kept).for_each(|(rows, &number)| {
-            splines.share(octree, &octree.all()[number], &own, rows);
+        let candidates: Vec<(Candidates, Candidates)> = (0..edge(reach)).map(|i| candidates(reach, i)).collect();
+        let mut shared = empty();
+        let numbers: &mut [f64] = bytemuck::cast_slice_mut(&mut shared);
+        numbers.par_chunks_mut(channels * per_brick).zip(&kept).for_each(|(numbers, &number)| {
+            splines.share(octree, &octree.all()[number], bytemuck::cast_slice(&own), &candidates, numbers);
         });
-        splines.rows = shared;
+        splines.lines = shared;
         splines.follow_larger(octree, &kept);
         splines
     }
 
+    /// Where a brick's coefficient of a channel is.
+    fn place(&self, slot: u32, channel: usize, [x, y, z]: [usize; 3]) -> usize {
+        (slot as usize * self.channels + channel) * per_brick(self.reach)
+            + x
+            + stride(self.reach) * (y + edge(self.reach) * z)
+    }
+
+    /// Neighbours in steps of bricks that a brick's coefficients depend on.
+    fn steps(&self) -> usize {
+        self.reach - 1
+    }
+
     /// The mean of what all bricks of one size have for a coefficient: of those that hold its node if there are any, else of
     /// those beside it.
-    fn share(&self, octree: &Octree, brick: &Brick, own: &[Row], rows: &mut [Row]) {
-        let slots = octree.around(brick).map(|neighbour| {
-            neighbour.filter(|n| octree.all()[*n].level == brick.level).map_or(NONE, |n| self.slots[n])
-        });
-        for (row, at) in (0..ROWS).map(|row| (row, [row % EDGE, row / EDGE])) {
-            for x in 0..EDGE {
-                let at = [x, at[0], at[1]];
-                for channel in 0..self.channels {
-                    let mean = |of: &[&[(usize, usize)]; EDGE]| {
-                        let (mut sum, mut count) = (0.0, 0.0);
-                        for (oz, k) in of[at[2]] {
-                            for (oy, j) in of[at[1]] {
-                                for (ox, i) in of[at[0]] {
-                                    let slot = slots[ox + 3 * oy + 9 * oz];
-                                    if slot != NONE {
-                                        let brick = (slot as usize * self.channels + channel) * ROWS;
-                                        sum += own[brick + j + EDGE * k].0[*i];
-                                        count += 1.0;
-                                    }
-                                }
-                            }
+    fn share(
+        &self,
+        octree: &Octree,
+        brick: &Brick,
+        own: &[f64],
+        candidates: &[(Candidates, Candidates)],
+        numbers: &mut [f64],
+    ) {
+        let around = octree.around(brick, self.steps());
+        let alike = |n: &usize| octree.all()[*n].level == brick.level;
+        let slots: Vec<u32> = around.iter().map(|n| n.filter(alike).map_or(NONE, |n| self.slots[n])).collect();
+        let (side, edge) = (2 * self.steps() + 1, edge(self.reach));
+        let mean = |of: [&Candidates; 3], channel: usize| {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for (oz, k) in of[2] {
+                for (oy, j) in of[1] {
+                    for (ox, i) in of[0] {
+                        let slot = slots[ox + side * (oy + side * oz)];
+                        if slot != NONE {
+                            sum += own[self.place(slot, channel, [*i, *j, *k])];
+                            count += 1.0;
                         }
-                        (count > 0.0).then(|| sum / count)
-                    };
-                    let value = mean(&HOLDING).or_else(|| mean(&HOLDING_OR_BESIDE));
-                    rows[channel * ROWS + row].0[x] = value.unwrap_or(0.0);
+                    }
                 }
+            }
+            (count > 0.0).then(|| sum / count)
+        };
+        for at in (0..edge * edge * edge).map(|n| [n % edge, n / edge % edge, n / (edge * edge)]) {
+            for channel in 0..self.channels {
+                let value =
+                    mean(at.map(|i| &candidates[i].0), channel).or_else(|| mean(at.map(|i| &candidates[i].1), channel));
+                numbers[self.place(0, channel, at)] = value.unwrap_or(0.0);
             }
         }
     }
@@ -133,74 +165,92 @@ impl Splines {
     fn follow_larger(&mut self, octree: &Octree, kept: &[usize]) {
         let levels = kept.iter().map(|n| octree.all()[*n].level).max().unwrap_or(0);
         for level in 1..=levels {
-            let followed: Vec<(usize, usize, f64)> = kept
+            let followed: Vec<(usize, f64)> = kept
                 .par_iter()
                 .filter(|n| octree.all()[**n].level == level)
                 .flat_map_iter(|&number| self.followed(octree, number))
                 .collect();
-            for (row, x, value) in followed {
-                self.rows[row].0[x] = value;
+            let numbers: &mut [f64] = bytemuck::cast_slice_mut(&mut self.lines);
+            for (place, value) in followed {
+                numbers[place] = value;
             }
         }
     }
 
-    /// For one brick: row, place in it and value of coefficients that follow a larger brick.
-    fn followed(&self, octree: &Octree, number: usize) -> Vec<(usize, usize, f64)> {
+    /// For one brick the places and values of coefficients that follow a larger brick.
+    fn followed(&self, octree: &Octree, number: usize) -> Vec<(usize, f64)> {
         let brick = &octree.all()[number];
-        let larger = octree
-            .around(brick)
-            .map(|neighbour| neighbour.filter(|n| octree.all()[*n].level < brick.level && self.slots[*n] != NONE));
+        let is_larger = |n: &usize| octree.all()[*n].level < brick.level && self.slots[*n] != NONE;
+        let larger: Vec<Option<usize>> =
+            octree.around(brick, self.steps()).into_iter().map(|n| n.filter(is_larger)).collect();
         let mut followed = Vec::new();
         if larger.iter().all(Option::is_none) {
             return followed;
         }
-        // A spline reaches two cells to both sides of its node, which stands at i - 1.
+        let (reach, steps, edge) = (self.reach as i64, self.steps() as i64, edge(self.reach));
+        let side = 2 * self.steps() + 1;
+        // The neighbours that the spline of a place reaches into: cells from `reach` before its node on.
         let reached = |i: usize| {
-            if i < 3 {
-                0..2
-            } else if i == 3 {
-                1..2
-            } else {
-                1..3
-            }
+            let node = i as i64 - steps;
+            let bricks = (node - reach).div_euclid(CELLS as i64)..=(node + reach - 1).div_euclid(CELLS as i64);
+            bricks.map(move |o| (o + steps) as usize)
         };
-        for z in 0..EDGE {
-            for y in 0..EDGE {
-                for x in 0..EDGE {
-                    let found = reached(z)
-                        .flat_map(|oz| reached(y).map(move |oy| 3 * oy + 9 * oz))
-                        .flat_map(|o| reached(x).map(move |ox| ox + o))
-                        .find_map(|o| larger[o]);
-                    let Some(found) = found else { continue };
-                    let other = &octree.all()[found];
-                    // Weights of three places of the larger brick from `first` on, along each axis.
-                    let at = [x, y, z];
-                    let two_scale: [(usize, [f64; 3]); 3] = std::array::from_fn(|k| {
-                        let node = i64::from(brick.at[k]) * CELLS as i64 + at[k] as i64 - 1;
-                        let place = node.div_euclid(2) - i64::from(other.at[k]) * CELLS as i64;
-                        match node.rem_euclid(2) {
-                            0 => (place as usize, [0.125, 0.75, 0.125]),
-                            _ if place < 0 => (0, [0.5, 0.5, 0.0]),
-                            _ => (place as usize, [0.0, 0.5, 0.5]),
+        for at in (0..edge * edge * edge).map(|n| [n % edge, n / edge % edge, n / (edge * edge)]) {
+            let found = reached(at[2])
+                .flat_map(|oz| reached(at[1]).map(move |oy| side * (oy + side * oz)))
+                .flat_map(|o| reached(at[0]).map(move |ox| ox + o))
+                .find_map(|o| larger[o]);
+            let Some(found) = found else { continue };
+            let other = &octree.all()[found];
+            let weights: [(i64, [f64; 4]); 3] = std::array::from_fn(|k| {
+                let node = i64::from(brick.at[k]) * CELLS as i64 + at[k] as i64 - steps;
+                let (first, weights) = two_scale(self.reach, node);
+                (first - i64::from(other.at[k]) * CELLS as i64 + steps, weights)
+            });
+            let along = |k: usize| {
+                let (first, weights) = weights[k];
+                let some = (0..4).filter(move |n| weights[*n] != 0.0);
+                some.map(move |n| ((first + n as i64) as usize, weights[n]))
+            };
+            for channel in 0..self.channels {
+                let mut value = 0.0;
+                for (z, wz) in along(2) {
+                    for (y, wy) in along(1) {
+                        for (x, wx) in along(0) {
+                            value += wx * wy * wz * self.numbers()[self.place(self.slots[found], channel, [x, y, z])];
                         }
-                    });
-                    for channel in 0..self.channels {
-                        let rows = (self.slots[found] as usize * self.channels + channel) * ROWS;
-                        let [(i, wx), (j, wy), (k, wz)] = two_scale;
-                        let mut value = 0.0;
-                        for (c, wz) in wz.iter().enumerate() {
-                            for (b, wy) in wy.iter().enumerate() {
-                                let row = &self.rows[rows + (j + b) + EDGE * (k + c)].0;
-                                value += wz * wy * (0..3).map(|a| wx[a] * row[i + a]).sum::<f64>();
-                            }
-                        }
-                        let row = (self.slots[number] as usize * self.channels + channel) * ROWS + y + EDGE * z;
-                        followed.push((row, x, value));
                     }
                 }
+                followed.push((self.place(self.slots[number], channel, at), value));
             }
         }
         followed
+    }
+}
+
+/// For a place along an axis the neighbours that hold its node, with the place that it has in them, and the same of all that have
+/// a coefficient for it.
+fn candidates(reach: usize, place: usize) -> (Candidates, Candidates) {
+    let steps = reach - 1;
+    let all: Candidates = (0..=2 * steps)
+        .filter_map(|o| {
+            let there = (place + CELLS * steps).checked_sub(CELLS * o)?;
+            (there < edge(reach)).then_some((o, there))
+        })
+        .collect();
+    let holding = all.iter().copied().filter(|(_, there)| (steps..=steps + CELLS).contains(there)).collect();
+    (holding, all)
+}
+
+/// How the coefficient at a node of small cells follows from those of cells of twice the size: the first of these, counted from
+/// the same origin, and the weights of four from there on.
+fn two_scale(reach: usize, node: i64) -> (i64, [f64; 4]) {
+    let below = node.div_euclid(2);
+    match (reach, node.rem_euclid(2)) {
+        (CUBIC, 0) => (below - 1, [0.125, 0.75, 0.125, 0.0]),
+        (CUBIC, _) => (below, [0.5, 0.5, 0.0, 0.0]),
+        (_, 0) => (below - 1, [0.1875, 0.625, 0.1875, 0.0]),
+        _ => (below - 1, [0.03125, 0.46875, 0.46875, 0.03125]),
     }
 }
 
@@ -218,40 +268,47 @@ fn combined(table: &PotentialTable, weights: &[Vec<f64>]) -> Vec<f64> {
     nodes
 }
 
-/// Coefficients along one axis from the six numbers of a polynomial of degree five: c = f - δ² f''/6 + δ⁴ f''''/72, the inverse of
-/// what the spline's values at its nodes are, (c₋₁ + 4 c₀ + c₁)/6 = c + δ² c''/6 + δ⁴ c''''/72 + ..., exact for degree five.
-fn prefilter() -> [[f64; 6]; EDGE] {
+/// Coefficients along one axis from the six numbers of a polynomial of degree five: the inverse of what the spline's values at its
+/// nodes are, exact for degree five. Cubic: (c₋₁ + 4 c₀ + c₁)/6 = c + δ² c''/6 + δ⁴ c/72 + ..., so c = f - δ² f/6 + δ⁴ f/72.
+/// Degree five: (c₋₂ + 26 c₋₁ + 66 c₀ + 26 c₁ + c₂)/120 = c + δ² c''/4 + 7 δ⁴ c/240 + ..., so c = f - δ² f/4 + δ⁴ f/30.
+fn prefilter(reach: usize) -> Vec<[f64; 6]> {
     let cell = 1.0 / CELLS as f64;
-    std::array::from_fn(|i| {
-        let t = (i as f64 - 1.0) * cell;
-        let [value, second, fourth] = [0, 2, 4].map(|order| basis(t, order));
-        std::array::from_fn(|k| value[k] - cell.powi(2) / 6.0 * second[k] + cell.powi(4) / 72.0 * fourth[k])
-    })
+    let (second, fourth) = if reach == CUBIC { (1.0 / 6.0, 1.0 / 72.0) } else { (0.25, 1.0 / 30.0) };
+    let factors = [1.0, -second * cell.powi(2), fourth * cell.powi(4)];
+    let at = |i: usize| {
+        let t = (i as f64 - (reach as f64 - 1.0)) * cell;
+        let derivatives = [0, 2, 4].map(|order| basis(t, order));
+        std::array::from_fn(|k| (0..3).map(|d| factors[d] * derivatives[d][k]).sum())
+    };
+    (0..edge(reach)).map(at).collect()
 }
 
+/// Coefficients along an edge at most.
+const LONGEST: usize = edge(QUINTIC);
+
 /// All coefficients of a brick from its polynomial alone, axis by axis.
-fn coefficients(corners: &[f64; 216], prefilter: &[[f64; 6]; EDGE], rows: &mut [Row]) {
-    let mut along_x = [[0.0; 8]; 36];
+fn coefficients(corners: &[f64; 216], prefilter: &[[f64; 6]], reach: usize, numbers: &mut [f64]) {
+    let (edge, stride) = (edge(reach), stride(reach));
+    let mut along_x = [[0.0; LONGEST]; 36];
     for (row, corners) in along_x.iter_mut().zip(corners.chunks_exact(6)) {
         for (x, weights) in row.iter_mut().zip(prefilter) {
             *x = (0..6).map(|a| weights[a] * corners[a]).sum();
         }
     }
-    let mut along_y = [[0.0; 8]; 6 * EDGE];
+    let mut along_y = [[0.0; LONGEST]; 6 * LONGEST];
     for c in 0..6 {
         for (j, weights) in prefilter.iter().enumerate() {
-            let row = &mut along_y[c * EDGE + j];
+            let row = &mut along_y[c * edge + j];
             for (b, w) in weights.iter().enumerate() {
                 row.iter_mut().zip(&along_x[6 * c + b]).for_each(|(sum, x)| *sum += w * x);
             }
         }
     }
     for (k, weights) in prefilter.iter().enumerate() {
-        for j in 0..EDGE {
-            let row = &mut rows[j + EDGE * k].0;
-            *row = [0.0; 8];
+        for j in 0..edge {
+            let row = &mut numbers[stride * (j + edge * k)..][..edge];
             for (c, w) in weights.iter().enumerate() {
-                row.iter_mut().zip(&along_y[c * EDGE + j]).for_each(|(sum, x)| *sum += w * x);
+                row.iter_mut().zip(&along_y[c * edge + j]).for_each(|(sum, x)| *sum += w * x);
             }
         }
     }

@@ -14,7 +14,7 @@ use super::measure::{TableReport, measure};
 use super::octree::{Brick, MAX_LEVEL, NONE, Octree};
 use super::refine::{Quality, quality, rescale};
 use super::spline::Splines;
-use super::{CELLS_PER_BRICK, Grid, PER_NODE, PotentialTable};
+use super::{CELLS_PER_BRICK, Grid, PER_NODE, PotentialTable, reach_for};
 use crate::{ElectrodeBasis, PanelSum, Plane};
 
 /// What is wanted of a table.
@@ -110,7 +110,7 @@ pub fn tabulate_around(
     let functions = basis.functions();
     let bytes = |spacing: f64| {
         let bricks = PotentialTable::bricks_for(options.min, options.max, spacing);
-        (bricks, PotentialTable::bytes_while_filling(&bricks, functions))
+        (bricks, PotentialTable::bytes_while_filling(&bricks, functions, options.accuracy))
     };
     let (grid, needed) = bytes(spacing);
     if needed > options.max_bytes {
@@ -131,7 +131,12 @@ pub fn tabulate_around(
         options,
         interest,
         exact: basis.panel_sum(),
-        table: PotentialTable { octree: Octree::new(grid), channels: functions, nodes: Vec::new() },
+        table: PotentialTable {
+            octree: Octree::new(grid),
+            channels: functions,
+            accuracy: options.accuracy,
+            nodes: Vec::new(),
+        },
         ids: HashMap::new(),
         clearance: Vec::new(),
         quality: Vec::new(),
@@ -234,13 +239,13 @@ impl Maker<'_> {
         if !brick.is_filled() {
             return Vec::new();
         }
-        let n = self.table.channels;
+        let (n, reach) = (self.table.channels, reach_for(self.options.accuracy));
         let of = |node: u32, c: usize| {
             let first = (node as usize * n + c) * PER_NODE;
             &self.table.nodes[first..first + PER_NODE]
         };
         let (size, edges) = (0.5_f64.powi(i32::from(brick.level)), octree.size(brick.level).into());
-        (0..n).map(|c| quality(&brick.corners.map(|node| of(node, c)), size, edges)).collect()
+        (0..n).map(|c| quality(&brick.corners.map(|node| of(node, c)), size, edges, reach)).collect()
     }
 
     /// Marks the bricks that are good enough to be interpolated.
@@ -345,7 +350,8 @@ impl Maker<'_> {
             let nodes = self.ids.len() + 10 * all.len();
             let n = self.table.channels;
             let bricks = self.table.octree.all().len() + 8 * all.len();
-            let bytes = (8 * PER_NODE * n * nodes) as u64 / 3 * 4 + Splines::bytes_for(bricks, n);
+            let bytes = (8 * PER_NODE * n * nodes) as u64 / 3 * 4
+                + Splines::bytes_for(reach_for(self.options.accuracy), bricks, n);
             if nodes <= most_nodes && bytes <= self.options.max_bytes {
                 for number in all {
                     self.table.octree.halve(number);
