@@ -74,10 +74,11 @@ pub fn solution_key(case: &Case) -> Digest {
     digest(&[parts.geometry.as_bytes(), parts.sources.as_bytes()])
 }
 
-/// Everything that a table depends on: its solution, its settings, its box and where grains start near conductors.
+/// Everything that a table depends on: its solution, its settings, its box and how small its bricks are beside conductors.
 pub fn table_key(case: &Case, plan: &Plan) -> Digest {
-    let points = [plan.options.min, plan.options.max].into_iter().chain(plan.starts.iter().copied());
-    let numbers: Vec<u8> = points.flat_map(<[f64; 3]>::from).flat_map(f64::to_le_bytes).collect();
+    let (min, max) = (plan.options.min, plan.options.max);
+    let numbers = min.iter().chain(max.iter()).flat_map(|x| x.to_le_bytes()).chain([plan.halvings]);
+    let numbers: Vec<u8> = numbers.collect();
     digest(&[&solution_key(case), case.parts().table.as_bytes(), &numbers])
 }
 

@@ -103,6 +103,6 @@ pub use quadratic::{Quadratic, QuadraticField};
 pub use source::{Source, SourceKind};
 pub use table::{
     Brick, CELLS_PER_BRICK, Grid, Octree, PER_NODE, PotentialTable, SMOOTH, TableError, TableOptions, TableReport,
-    TabulatedField, points_near_conductors, tabulate, tabulate_around,
+    TabulatedField, halvings_for, tabulate, tabulate_around,
 };
 pub use waveform::{Waveform, WaveformPart};

@@ -187,8 +187,8 @@ fn multipoles(orders: &[(usize, f64)], p: &Vec3) -> [f64; PER_NODE] {
     all
 }
 
-/// What a trap of real electrodes has: mostly a quadrupole.
-const ORDERS: [(usize, f64); 7] = [(1, 0.3), (2, 1.0), (3, 0.5), (4, 0.5), (6, 0.2), (8, 0.1), (10, 0.05)];
+/// What a trap of real electrodes has: mostly a quadrupole, some hexapole, octupole and dodecapole.
+const ORDERS: [(usize, f64); 4] = [(2, 1.0), (3, 0.05), (4, 0.05), (6, 0.01)];
 
 /// Half the side of the box of these tables.
 const HALF: f64 = 0.9;

@@ -2,9 +2,7 @@
 
 use std::time::Instant;
 
-use field::{
-    ElectrodeBasis, PotentialTable, TableError, TableOptions, TableReport, points_near_conductors, tabulate_around,
-};
+use field::{ElectrodeBasis, PotentialTable, TableError, TableOptions, TableReport, halvings_for, tabulate_around};
 
 use meshes::Vec3;
 use serde::{Deserialize, Serialize};
@@ -48,8 +46,9 @@ impl Tabulated {
 pub struct Plan {
     /// Its box, accuracy and spacing, and the memory it may take.
     pub options: TableOptions,
-    /// Where grains start near conductors, m. They have a part in the table through these and the box, and no other.
-    pub starts: Vec<Vec3>,
+    /// How often bricks beside conductors are halved for the sake of where grains start. They have a part in the table through
+    /// this and the box, and no other.
+    pub halvings: u8,
 }
 
 impl Plan {
@@ -63,8 +62,8 @@ impl Plan {
             spacing: case.table.spacing,
             max_bytes: table_memory(case),
         };
-        let starts = points_near_conductors(basis, &options, &starts(case));
-        Self { options, starts }
+        let halvings = halvings_for(basis, &options, &starts(case));
+        Self { options, halvings }
     }
 }
 
@@ -86,7 +85,7 @@ pub fn table(
 ) -> Result<Tabulated, Failure> {
     reporter.stage("table");
     let start = Instant::now();
-    let (table, report) = tabulate_around(basis, &plan.options, &plan.starts, &|done| reporter.fraction(done))
+    let (table, report) = tabulate_around(basis, &plan.options, plan.halvings, &|done| reporter.fraction(done))
         .map_err(|error| too_large(case, source, error))?;
     let tabulated = Tabulated { table, report, seconds: start.elapsed().as_secs_f64(), kept: false };
     tabulated.warn_if_missed(case, reporter);

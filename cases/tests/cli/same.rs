@@ -96,7 +96,7 @@ fn cli_what_is_kept_is_used_again_and_changes_no_bit() {
         assert_eq!((slow["solution"].as_str(), reused(&slow)), (Some("solved"), vec![]), "{change}");
     }
     // Of a table alone the solution stays.
-    for change in ["table.spacing=1.9 mm", "table.accuracy=2e-2"] {
+    for change in ["table.spacing=0.45 mm", "table.accuracy=2e-2"] {
         go("run", &kept, &[]);
         let half = same_when_fresh("run", &kept, &anew, change);
         assert_eq!(reused(&half), ["solution"], "{change}");

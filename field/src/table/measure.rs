@@ -74,7 +74,7 @@ pub(super) fn measure(table: &PotentialTable, clearance: &[f32], exact: &PanelSu
     let points: Vec<Vec3> = drawn.iter().map(|(_, point)| *point).collect();
     let mut truth = Samples::default();
     exact.sample(&points, &mut truth);
-    let n = table.channels;
+    let n = if points.is_empty() { 0 } else { table.channels };
     let mut report = TableReport { error_points: points.len(), ..TableReport::default() };
     // One function after the other: splines of all of them may not fit in memory.
     for c in 0..n {

@@ -30,7 +30,7 @@ pub use grid::Grid;
 pub use hermite::PER_NODE;
 pub use measure::TableReport;
 pub use octree::{Brick, Octree};
-pub use tabulate::{TableError, TableOptions, points_near_conductors, tabulate, tabulate_around};
+pub use tabulate::{TableError, TableOptions, halvings_for, tabulate, tabulate_around};
 
 use crate::panel_sum::PanelSum;
 use crate::{BasisField, ElectrodeBasis, Samples};

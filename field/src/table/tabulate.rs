@@ -73,7 +73,7 @@ const FIRST_BRICKS: f64 = 12.0;
 /// conductor takes some hundred times as long as an interpolated one (`field/benches`).
 const WIDE: f64 = 0.85;
 
-/// Points of interest that are to lie in interpolated bricks: all but what is next to a conductor anyway.
+/// Part of the points of interest that are to lie in interpolated bricks: all but what is next to a conductor anyway.
 const COVERED: f64 = 0.9;
 
 /// Nodes times basis functions above which no bricks are halved for those two reasons.
@@ -91,18 +91,19 @@ pub fn tabulate(
     options: &TableOptions,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<(PotentialTable, TableReport), TableError> {
-    tabulate_around(basis, options, &[], progress)
+    tabulate_around(basis, options, 0, progress)
 }
 
-/// As [`tabulate`], with bricks so small that the table holds most points of interest (where grains start, say): what is next to a
-/// conductor is left to the exact sum, which takes some hundred times as long (`field/benches`).
+/// As [`tabulate`], with bricks beside conductors halved so often ([`halvings_for`] points of interest, where grains start, say), as
+/// long as the table stays small: what is next to a conductor is left to the exact sum, which takes some hundred times as
+/// long (`field/benches`).
 ///
 /// # Errors
 /// As [`tabulate`].
 pub fn tabulate_around(
     basis: &ElectrodeBasis,
     options: &TableOptions,
-    interest: &[Vec3],
+    halvings: u8,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<(PotentialTable, TableReport), TableError> {
     let longest = (options.max - options.min).max();
@@ -129,7 +130,7 @@ pub fn tabulate_around(
     let mut maker = Maker {
         basis,
         options,
-        interest,
+        halvings,
         exact: basis.panel_sum(),
         table: PotentialTable {
             octree: Octree::new(grid),
@@ -148,20 +149,29 @@ pub fn tabulate_around(
     Ok(maker.finished())
 }
 
-/// The points of interest that can make a difference to [`tabulate_around`]: those near conductors.
-pub fn points_near_conductors(basis: &ElectrodeBasis, options: &TableOptions, points: &[Vec3]) -> Vec<Vec3> {
+/// How often bricks beside conductors have to be halved for most of these points to lie in interpolated ones.
+pub fn halvings_for(basis: &ElectrodeBasis, options: &TableOptions, points: &[Vec3]) -> u8 {
+    if points.is_empty() || options.spacing.is_some() {
+        return 0;
+    }
     let first = (options.max - options.min).max() / FIRST_BRICKS;
-    // The farthest point of a brick of which some point is within its own distance from a conductor.
-    let reach = (NEAREST + 2.0 * 3.0_f64.sqrt()) * first;
+    // Where a point may be farthest from a conductor that is too near to its brick.
+    let bricks = NEAREST + 3.0_f64.sqrt();
     let tree = SurfaceTree::new(&basis.mesh);
-    points.iter().copied().filter(|p| tree.nearest(p, reach).is_some()).collect()
+    let distance = |p: &Vec3| tree.nearest(p, bricks * first).map_or(bricks * first, |nearest| nearest.distance);
+    let mut distances: Vec<f64> = points.iter().map(distance).collect();
+    distances.sort_by(f64::total_cmp);
+    let most = distances[((1.0 - COVERED) * (distances.len() - 1) as f64) as usize];
+    let halvings = (bricks * first / most.max(first * 1e-3)).log2().ceil();
+    (halvings.max(0.0) as u8).min(MAX_LEVEL)
 }
 
 /// A table in the making.
 struct Maker<'a> {
     basis: &'a ElectrodeBasis,
     options: &'a TableOptions,
-    interest: &'a [Vec3],
+    /// How often bricks beside conductors are to be halved.
+    halvings: u8,
     exact: PanelSum,
     table: PotentialTable,
     /// The number of the node at a place.
@@ -315,7 +325,7 @@ impl Maker<'_> {
         bad.into_iter().map(|(_, n)| n).collect()
     }
 
-    /// Bricks that are left to the exact sum, if that is too much of the space, or those of them that hold points of interest.
+    /// Bricks that are left to the exact sum, if that is too much of the space or they are larger than they should be.
     fn too_wide(&self) -> Vec<usize> {
         let octree = &self.table.octree;
         let whole: Vec<usize> = octree.whole().map(|(n, _)| n).collect();
@@ -326,18 +336,8 @@ impl Maker<'_> {
         let free: f64 = whole.iter().copied().filter(outside).map(volume).sum();
         let left: f64 = whole.iter().copied().filter(open).map(volume).sum();
         let wide = left <= (1.0 - WIDE) * free;
-        let holders: Vec<usize> = self.interest.iter().filter_map(|p| octree.locate(p)).map(|(n, _)| n).collect();
-        let held = holders.iter().filter(|n| octree.all()[**n].tabulated).count();
-        if !wide {
-            whole.iter().copied().filter(|n| can(n) && open(n)).collect()
-        } else if (held as f64) < COVERED * holders.len() as f64 {
-            let mut holders: Vec<usize> = holders.into_iter().filter(|n| can(n) && open(n)).collect();
-            holders.sort_unstable();
-            holders.dedup();
-            holders
-        } else {
-            Vec::new()
-        }
+        let coarse = |n: &usize| !wide || octree.all()[*n].level < self.halvings;
+        whole.iter().copied().filter(|n| can(n) && open(n) && coarse(n)).collect()
     }
 
     /// Halves bricks and what has to be halved with them, as many of them, from the first on, as there is room for; whether there
