@@ -101,6 +101,7 @@ pub mod grains;
 pub mod observer;
 pub mod options;
 pub mod outcome;
+pub mod secular;
 pub mod stability;
 pub mod stream;
 pub mod system;
