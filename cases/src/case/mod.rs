@@ -1,5 +1,6 @@
 //! A case as the pipeline sees it: complete, checked, in SI.
 
+mod analysis;
 mod electrode;
 mod foreign;
 mod parts;
@@ -10,6 +11,7 @@ use std::path::Path;
 use serde::Serialize;
 
 pub use crate::keys::settings::{Gas, Integrator, Method, Reflection, Solver};
+pub use analysis::{Analysis, WantedMultipole, Wish};
 pub use electrode::{Drive, Electrode, ElectrodeShape, ImportedMesh, MeshFormat, Source, SourceKind};
 pub use parts::CaseParts;
 pub use settings::{
@@ -43,6 +45,8 @@ pub struct Case {
     pub trace: Option<TraceSettings>,
     /// What is written.
     pub output: Output,
+    /// What an analysis looks at.
+    pub analysis: Analysis,
     /// What a study varies.
     pub sweep: Option<Sweep>,
 }

@@ -87,7 +87,11 @@ pub fn of_flights(out: &mut OutputFolder, title: &str, flights: &Flights) -> Res
     write(out, "phase_planes", &phase_planes(title, &tracks))
 }
 
-fn write(out: &mut OutputFolder, name: &str, figure: &Figure) -> Result<(), Failure> {
+/// Draws a figure as `name.svg` and `name.png`.
+///
+/// # Errors
+/// The output fails.
+pub fn write(out: &mut OutputFolder, name: &str, figure: &Figure) -> Result<(), Failure> {
     let failed = |error: PlotError| {
         Failure::run(format!("the plot `{name}` cannot be drawn: {error}"), "this is a fault of graintrap")
     };

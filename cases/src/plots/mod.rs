@@ -18,17 +18,21 @@
 
 mod axis;
 mod axis_potential;
+mod contour;
 mod coordinates;
 mod draw;
 mod legend;
 mod phase_planes;
+mod potential_map;
 mod prefix;
 mod thin;
 mod track;
 
 pub use axis_potential::axis_potential;
+pub use contour::{Heights, joined};
 pub use coordinates::coordinates;
 pub use phase_planes::phase_planes;
+pub use potential_map::{Map, potential_maps};
 pub use track::{Ending, Track};
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! From the keys of a case file to a [`Case`]: defaults filled in, and every rule checked that ties keys together.
 
+mod analysis;
 mod at;
 mod electrodes;
 mod files;
@@ -42,6 +43,7 @@ pub(crate) fn case(source: &CaseSource) -> Result<Case, CaseError> {
     if field.ground.is_some() {
         names::not_ground(&root, &electrodes, &sources)?;
     }
+    let analysis = analysis::analysis(&root.key("analysis"), &keys.analysis, &electrodes)?;
     Ok(Case {
         title: keys.title.unwrap_or_default(),
         electrodes,
@@ -52,6 +54,7 @@ pub(crate) fn case(source: &CaseSource) -> Result<Case, CaseError> {
         forces,
         trace,
         output: settings::output(&keys.output),
+        analysis,
         sweep: keys.sweep.map(|keys| sweep::sweep(&root.key("sweep"), keys)).transpose()?,
     })
 }

@@ -17,6 +17,7 @@ pub mod effective;
 pub mod expansion;
 pub mod multipoles;
 pub mod tones;
+pub mod voltages;
 pub mod well;
 
 pub use critical::{CriticalPoint, Kind, Lattice, Search, critical_points, critical_points_on, values_on};
@@ -24,6 +25,7 @@ pub use effective::{Effective, Local, Square};
 pub use expansion::{Expansion, Jet};
 pub use multipoles::Multipoles;
 pub use tones::{Tone, Tones};
+pub use voltages::{Voltages, voltages};
 pub use well::{Opening, Well, well};
 
 use meshes::Vec3;

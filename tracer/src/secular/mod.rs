@@ -6,6 +6,7 @@
 pub mod mathieu;
 pub mod modes;
 pub mod spectrum;
+pub mod traced;
 
 use field::Waveform;
 use field::analysis::Expansion;
@@ -16,6 +17,7 @@ use crate::{DragError, System};
 
 pub use mathieu::Mathieu;
 pub use modes::{Mode, modes};
+pub use traced::{effective, traced};
 
 /// A grain close to a point of a driven field: the exact field about the point, and everything else that is linear.
 #[derive(Clone, Debug)]

@@ -1,0 +1,36 @@
+//! `graintrap analyse`: the case as a trap.
+
+use std::time::Instant;
+
+use super::fields::solved;
+use super::session::Session;
+use crate::output::{analysis_pictures, analysis_text};
+use crate::pipeline::{Failure, Reporter};
+use crate::pipeline::analysis::analyse as analysis;
+use crate::pipeline::ready::ready;
+
+/// Name of the file with everything.
+const FILE: &str = "analysis.json";
+
+pub(super) fn analyse(session: &Session) -> Result<(), Failure> {
+    let (case, source) = (&session.case, &session.source);
+    let mut out = session.output()?;
+    let ready = ready(case, source, &*session.progress)?;
+    let solution = solved(session, &ready)?;
+    let start = Instant::now();
+    let (mut report, shown) = analysis(case, source, &solution, &*session.progress)?;
+    session.progress.stage("pictures");
+    analysis_pictures::write(&mut out, case, &session.title(), &solution, &report, &shown)?;
+    session.cache.write(&mut out, case, &solution, None)?;
+    report.version = env!("CARGO_PKG_VERSION");
+    report.command = "analyse";
+    report.title = session.title();
+    report.seconds = start.elapsed().as_secs_f64();
+    report.warnings = session.progress.warnings();
+    report.files = out.names().to_vec();
+    report.files.push(FILE.to_owned());
+    out.write(FILE, |w| serde_json::to_writer_pretty(w, &report))?;
+    out.commit()?;
+    session.say(&report, || analysis_text::text(&report, &session.folder));
+    Ok(())
+}
