@@ -5,18 +5,28 @@ use std::time::Instant;
 use super::fields::solved;
 use super::session::Session;
 use crate::output::{analysis_pictures, analysis_text};
-use crate::pipeline::{Failure, Reporter};
 use crate::pipeline::analysis::analyse as analysis;
+use crate::pipeline::choice::Solver;
 use crate::pipeline::ready::ready;
+use crate::pipeline::{Failure, Reporter};
+
+/// Accuracy of the field that is asked for at least, where it is to be had in a tenth of a second.
+const ON_CURVES: f64 = 1e-7;
 
 /// Name of the file with everything.
 const FILE: &str = "analysis.json";
 
 pub(super) fn analyse(session: &Session) -> Result<(), Failure> {
-    let (case, source) = (&session.case, &session.source);
+    let source = &session.source;
     let mut out = session.output()?;
-    let ready = ready(case, source, &*session.progress)?;
-    let solution = solved(session, &ready)?;
+    let ready = ready(&session.case, source, &*session.progress)?;
+    // On generating curves seven digits cost nothing, and trap parameters are worth them.
+    let mut case = session.case.clone();
+    if ready.choice.solver == Solver::Axisymmetric {
+        case.field.accuracy = case.field.accuracy.min(ON_CURVES);
+    }
+    let case = &case;
+    let solution = solved(session, case, &ready)?;
     let start = Instant::now();
     let (mut report, shown) = analysis(case, source, &solution, &*session.progress)?;
     session.progress.stage("pictures");

@@ -47,13 +47,14 @@ pub fn write(
         return Ok(());
     }
     let cuts = plane.cuts(&solution.basis.mesh);
-    let subtitle = format!("through {} across {}", point(&plane.center), point(&plane.normal));
+    let subtitle = format!("the plane through {} m with normal {}", point(&plane.center), point(&plane.normal));
     pictures::write(out, "analysis_map", &potential_maps(title, &subtitle, plane.names(), &maps, &cuts))?;
     along_axes(out, title, report, shown)
 }
 
 fn point(p: &Vec3) -> String {
-    format!("({:.3}, {:.3}, {:.3})", p.x, p.y, p.z).replace('-', "\u{2212}")
+    let number = |x: f64| if x.abs() < 5e-7 { "0".to_owned() } else { format!("{x:.4}") };
+    format!("({}, {}, {})", number(p.x), number(p.y), number(p.z)).replace('-', "\u{2212}")
 }
 
 /// The plane that maps are drawn in.

@@ -45,8 +45,17 @@ fn more(text: &mut String, count: usize) {
 
 /// A place in the unit of its largest coordinate.
 fn place(p: &[f64; 3]) -> String {
-    let [x, y, z] = p.map(|x| if x.abs() < 1e-12 { 0.0 } else { x });
-    format!("({x:.6e}, {y:.6e}, {z:.6e}) m")
+    let largest = p.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let (factor, unit) = match largest {
+        l if l < 1e-9 => return "(0, 0, 0)".to_owned(),
+        l if l < 1e-4 => (1e6, "um"),
+        l if l < 0.1 => (1e3, "mm"),
+        _ => (1.0, "m"),
+    };
+    // Rounding is no coordinate.
+    let [x, y, z] = p.map(|x| if x.abs() < 1e-9 * largest.max(1e-3) { 0.0 } else { factor * x });
+    let number = |x: f64| if x == 0.0 { "0".to_owned() } else { format!("{x:.6}") };
+    format!("({}, {}, {}) {unit}", number(x), number(y), number(z))
 }
 
 fn null(null: &Null) -> String {

@@ -126,6 +126,9 @@ const CLOSE: f64 = 0.05;
 /// Starts of Newton's method, at most: the field is asked for at some thousand points for each.
 const MOST: usize = 150;
 
+/// Balls in which Newton's method goes on, at most: points that it finds take four or five.
+const ROUNDS: usize = 12;
+
 /// A curvature below this fraction of the largest counts as none.
 pub const FLAT: f64 = 1e-6;
 
@@ -196,8 +199,8 @@ pub fn critical_points_on(
     found
 }
 
-/// Nodes about which the gradient may vanish: where it is smaller than at all neighbours, and one of each group of cells in
-/// which all its components change sign.
+/// Nodes about which the gradient may vanish: all its components change sign among the neighbours. Of each neighbourhood the one
+/// with the smallest gradient.
 fn starts(lattice: &Lattice, values: &[f64]) -> Vec<Vec3> {
     let unit = |k: usize, by: isize| -> [isize; 3] { std::array::from_fn(|j| if j == k { by } else { 0 }) };
     let gradient: Vec<Option<Vec3>> = (0..lattice.len())
@@ -223,20 +226,20 @@ fn starts(lattice: &Lattice, values: &[f64]) -> Vec<Vec3> {
     for node in 0..lattice.len() {
         let Some(here) = gradient[node] else { continue };
         let (mut least, mut cell) = (true, [[f64::INFINITY, f64::NEG_INFINITY]; 3]);
-        let mut whole = true;
+        let mut count = 0;
         for by in cube() {
             let Some(there) = lattice.neighbour(node, by).and_then(|n| gradient[n]) else {
-                whole = false;
                 continue;
             };
+            count += 1;
             least &= by == [0; 3] || there.norm_squared() >= here.norm_squared();
             for k in 0..3 {
                 cell[k] = [cell[k][0].min(there[k]), cell[k][1].max(there[k])];
             }
         }
-        // A minimum of the gradient's size beside which it does not change sign is no critical point, but for flat ones.
-        let changes = whole && cell.iter().all(|[lo, hi]| *lo <= 0.0 && *hi >= 0.0);
-        if least || changes {
+        // Beside walls some are missing; of a few nothing can be told.
+        let changes = count >= 18 && cell.iter().all(|[lo, hi]| *lo <= 0.0 && *hi >= 0.0);
+        if changes {
             candidates.push((if least { -1.0 } else { 0.0 } + 1.0 - 1.0 / (1.0 + here.norm_squared()), node));
         }
     }
@@ -256,9 +259,10 @@ fn starts(lattice: &Lattice, values: &[f64]) -> Vec<Vec3> {
 /// Newton's method from a start, no further than `reach` (m). `None` where there is no critical point.
 pub fn polish(space: &Space, effective: &Effective, start: &Vec3, reach: f64) -> Option<CriticalPoint> {
     let mut point = *start;
-    for _ in 0..40 {
+    for _ in 0..ROUNDS {
         let room = space.room(&point);
-        if room <= 1e-9 * space.size {
+        // Next to a surface there is nothing to find, and the field is dear.
+        if room <= 0.01 * reach {
             return None;
         }
         let expansion = Expansion::near(space.field, point, room);

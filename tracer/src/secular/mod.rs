@@ -196,7 +196,7 @@ struct Flown {
 
 /// The shortest time that is a whole number of periods of every frequency (Hz), if these are as small multiples of something.
 pub fn common_period(frequencies: &[f64]) -> Option<f64> {
-    let slowest = frequencies.iter().copied().fold(f64::INFINITY, f64::min);
+    let slowest = frequencies.iter().copied().reduce(f64::min)?;
     // Beyond a hundred turns a matrix over the common period says little about the motion between.
     (1..=100).map(f64::from).find_map(|turns| {
         let whole = |f: &f64| {

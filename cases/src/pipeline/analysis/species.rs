@@ -288,9 +288,13 @@ fn secular(
             (Some(other), Some(by)) => (other - mode.frequency).abs() <= by + error,
             _ => true,
         };
+        // Of two modes alike any direction between is an axis: then those of the potential.
+        let alike = |other: &Mode| (other.frequency - mode.frequency).abs() <= 1e-6 * mode.frequency;
+        let many = equilibrium.modes.iter().filter(|other| alike(other)).count() > 1 && !magnetic;
+        let axis = if many { axes[k] } else { mode.axis };
         modes.push(ModeReport {
-            axis: mode.axis.into(),
-            roundness: mode.roundness,
+            axis: axis.into(),
+            roundness: if many { 0.0 } else { mode.roundness },
             transition: mode.frequency,
             transition_error: error,
             decay_rate: mode.rate,
