@@ -139,18 +139,31 @@ impl Plane {
 /// Nulls of the static field, or what is critical in the effective potential, that lie in the plane.
 fn marks(plane: &Plane, report: &Report, statics: bool) -> Vec<Mark> {
     let size = plane.to[0] - plane.from[0];
-    let in_plane = |p: &[f64; 3]| {
+    let axis = Vec3::from(report.axis);
+    let in_plane = |p: &[f64; 3], many: bool| -> Vec<[f64; 2]> {
         let p = Vec3::from(*p);
-        ((p - plane.center).dot(&plane.normal).abs() < 2e-3 * size).then(|| plane.coordinates(&p))
+        let away = p - plane.center;
+        let (along, radius) = (axis * away.dot(&axis), (away - axis * away.dot(&axis)).norm());
+        // A ring of points about the axis meets a plane through the axis twice.
+        if many && axis.dot(&plane.normal).abs() < 1e-9 && radius > 1e-6 * size {
+            let outward = axis.cross(&plane.normal) * radius;
+            return [1.0, -1.0].map(|side| plane.coordinates(&(plane.center + along + outward * side))).to_vec();
+        }
+        if away.dot(&plane.normal).abs() < 2e-3 * size { vec![plane.coordinates(&p)] } else { Vec::new() }
     };
     let mark = |label: &str, shape: Shape, points: Vec<[f64; 2]>| Mark { label: label.to_owned(), points, shape };
     let all = if statics {
-        let nulls = report.nulls.iter().filter(|n| n.of == "dc").filter_map(|n| in_plane(&n.position)).collect();
+        let nulls =
+            report.nulls.iter().filter(|n| n.of == "dc").flat_map(|n| in_plane(&n.position, n.one_of_many)).collect();
         vec![mark("null", Shape::Cross, nulls)]
     } else {
         let points = report.species.first().map(|s| s.effective.as_slice()).unwrap_or_default();
         let of = |minimum: bool| {
-            points.iter().filter(|p| (p.kind == "minimum") == minimum).filter_map(|p| in_plane(&p.position)).collect()
+            points
+                .iter()
+                .filter(|p| (p.kind == "minimum") == minimum)
+                .flat_map(|p| in_plane(&p.position, p.one_of_many))
+                .collect()
         };
         vec![mark("minimum", Shape::Circle, of(true)), mark("saddle", Shape::Cross, of(false))]
     };
@@ -177,7 +190,8 @@ fn map(
     let mut values = potential.values(shown.driven.field.basis().as_ref(), &places, &mut Samples::default());
     for (value, place) in values.iter_mut().zip(&places) {
         *value *= factor;
-        if clearance(&shown.driven.exact, place) <= 0.0 {
+        // No lines across a sheet: on its other side the field is another one.
+        if clearance(&shown.driven.exact, place) <= 0.6 * cell {
             *value = f64::NAN;
         }
     }

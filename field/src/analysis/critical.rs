@@ -59,7 +59,8 @@ pub struct Search {
     pub min: Vec3,
     /// Upper corner, m.
     pub max: Vec3,
-    /// About how many nodes. Points that are closer together than two cells may be missed.
+    /// About how many nodes. Points that are closer together than two cells, or to a surface than
+    /// one, may be missed.
     pub nodes: usize,
 }
 
@@ -123,6 +124,9 @@ impl Lattice {
 /// Nodes that have less room than this fraction of a cell are left out.
 const CLOSE: f64 = 0.05;
 
+/// Nor is anything looked for nearer to a surface than this part of a cell: what the lattice cannot resolve.
+const NEAREST: f64 = 0.7;
+
 /// Starts of Newton's method, at most: the field is asked for at some thousand points for each.
 const MOST: usize = 150;
 
@@ -171,7 +175,8 @@ pub fn critical_points_on(
     if effective.is_zero() {
         return Vec::new();
     }
-    let starts = starts(lattice, values);
+    let mut starts = starts(lattice, values);
+    starts.retain(|start| (space.clearance)(start) > NEAREST * lattice.step.min());
     let far = lattice.origin + Vec3::from_fn(|k, _| (lattice.counts[k] - 1) as f64 * lattice.step[k]);
     let within = |p: &Vec3| (0..3).all(|k| p[k] >= lattice.origin[k] && p[k] <= far[k]);
     let reach = 4.0 * lattice.step.norm();
@@ -262,7 +267,7 @@ pub fn polish(space: &Space, effective: &Effective, start: &Vec3, reach: f64) ->
     for _ in 0..ROUNDS {
         let room = space.room(&point);
         // Next to a surface there is nothing to find, and the field is dear.
-        if room <= 0.01 * reach {
+        if room <= 0.05 * reach {
             return None;
         }
         let expansion = Expansion::near(space.field, point, room);

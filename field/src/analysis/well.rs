@@ -29,6 +29,8 @@ pub struct Well {
     pub opening: Opening,
     /// The same place, m.
     pub point: Vec3,
+    /// Beside it on the side of the well, m: where the surface itself is met when panels only show it.
+    pub beside: Vec3,
     /// Estimated error of the depth.
     pub error: f64,
 }
@@ -105,27 +107,41 @@ pub fn well(
     let error_of = |depth: f64| 2.0 * space.error * depth;
     match end.exit {
         Some((Opening::Wall(electrode), hit)) if end.height > values[top] || top == end.node => {
-            let (point, value) = down(space, effective, &hit, &lattice.place(end.node), step, walls, &mut samples);
+            let (point, eye, value) = down(space, effective, &hit, &lattice.place(end.node), step, walls, &mut samples);
             let depth = value.max(values[top].min(end.height)) - floor;
             // A surface is met within a fiftieth of a cell, on panels that show it.
             let slack = 0.02 * (end.height - value).abs();
-            return Some(Well { depth, opening: Opening::Wall(electrode), point, error: error_of(depth) + slack });
+            let beside = eye;
+            return Some(Well {
+                depth,
+                opening: Opening::Wall(electrode),
+                point,
+                beside,
+                error: error_of(depth) + slack,
+            });
         }
         Some((Opening::Edge, point)) if end.height <= values[top] && top == end.node => {
             let depth = end.height - floor;
-            return Some(Well { depth, opening: Opening::Edge, point, error: error_of(depth) });
+            return Some(Well { depth, opening: Opening::Edge, point, beside: point, error: error_of(depth) });
         }
         _ => {}
     }
     Some(match pass() {
         Some(point) => {
             let depth = point.value - floor;
-            Well { depth, opening: Opening::Pass, point: point.position, error: error_of(depth) }
+            Well {
+                depth,
+                opening: Opening::Pass,
+                point: point.position,
+                beside: point.position,
+                error: error_of(depth),
+            }
         }
         // The lattice is too coarse for Newton's method: what it says, to a cell.
         None => {
             let depth = end.height - floor;
-            Well { depth, opening: Opening::Pass, point: lattice.place(top), error: error_of(depth) + 0.1 * depth }
+            let point = lattice.place(top);
+            Well { depth, opening: Opening::Pass, point, beside: point, error: error_of(depth) + 0.1 * depth }
         }
     })
 }
@@ -159,7 +175,7 @@ fn down(
     step: f64,
     walls: &Walls,
     samples: &mut Samples,
-) -> (Vec3, f64) {
+) -> (Vec3, Vec3, f64) {
     let mut eye = *from;
     let mut best = (*hit, beside(space, effective, hit, from, step, samples));
     let mut size = step;
@@ -186,7 +202,8 @@ fn down(
             size *= 0.5;
         }
     }
-    best
+    let away = (eye - best.0).try_normalize(0.0).unwrap_or_else(Vec3::zeros) * (0.02 * step);
+    (best.0, best.0 + away, best.1)
 }
 
 /// The edge of the flood: the lowest first, and of equals the first node.

@@ -120,7 +120,7 @@ pub(super) fn species(
         let walls = |a: &Vec3, b: &Vec3| first_wall(exact, case.field.ground.as_ref(), case.electrodes.len(), a, b);
         let floor = (&minimum.position, minimum.value);
         let found = well(space, &potential, (&ground.lattice, &values), floor, &others, &walls);
-        report.depth_ev = found.map(|well| depth(ground, group, &well));
+        report.depth_ev = found.map(|well| depth(ground, group, &on_surface(ground, &potential, minimum.value, well)));
         report.offset = Some(offset(ground, group, &potential, minimum, acceleration));
     }
     Ok((report, potential))
@@ -321,6 +321,35 @@ fn nearest_line(lines: &[Vec<Line>; 3], frequency: f64) -> Option<Line> {
         along.iter().filter(move |line| line.amplitude > 0.02 * largest)
     });
     strong.copied().min_by(|a, b| (a.frequency - frequency).abs().total_cmp(&(b.frequency - frequency).abs()))
+}
+
+/// The depth of a well that opens at an electrode, on the true surface in place of the panels that show it: from a point beside the
+/// panel it is as far as the electrode's own unit potential is from one, over its slope.
+fn on_surface(ground: &Ground, potential: &Effective, floor: f64, mut well: Well) -> Well {
+    let Opening::Wall(electrode) = well.opening else { return well };
+    if electrode >= ground.case.electrodes.len() {
+        return well;
+    }
+    let eye = well.beside;
+    let units = ground.solution.basis.panel_sum();
+    let mut samples = Samples::default();
+    field::BasisField::sample(&units, &[eye], &mut samples);
+    let (own, slope) = (samples.potential[electrode], samples.gradient[electrode]);
+    let distance = (1.0 - own) / slope.norm();
+    if !distance.is_finite() || distance.abs() > 0.3 * ground.space.size {
+        return well;
+    }
+    let out = slope / slope.norm();
+    let near = [eye, eye - out * distance.abs(), eye - out * (2.0 * distance.abs())];
+    let values = potential.values(ground.space.field, &near, &mut samples);
+    // A parabola through three places on the way, carried on to the surface.
+    let surface = 3.0 * values[0] - 3.0 * values[1] + values[2];
+    let depth = surface - floor;
+    // What the last step changed, a tenth of it.
+    well.error =
+        2.0 * ground.space.error * depth + 0.1 * (depth - well.depth).abs() + 0.02 * (surface - values[0]).abs();
+    well.depth = depth;
+    well
 }
 
 fn depth(ground: &Ground, group: &GrainGroup, well: &Well) -> Depth {
