@@ -114,8 +114,10 @@ impl Neighbourhood<'_> {
         }
         let (_, slope) = self.push(0.0, &position);
         let mut generator = Matrix6::zeros();
-        generator.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
-        generator.fixed_view_mut::<3, 3>(3, 0).copy_from(&slope);
+        // Velocities in positions per time of the fastest motion: entries of one size, or the eigenvalues lose their digits.
+        let time = 1.0 / slope.norm().sqrt().max(self.turning().norm()).max(f64::MIN_POSITIVE);
+        generator.fixed_view_mut::<3, 3>(0, 3).copy_from(&(Matrix3::identity() / time));
+        generator.fixed_view_mut::<3, 3>(3, 0).copy_from(&(slope * time));
         generator.fixed_view_mut::<3, 3>(3, 3).copy_from(&self.turning());
         let modes = modes::of_generator(&generator);
         Some(Equilibrium { position, velocity: Vec3::zeros(), excursion: 0.0, modes })

@@ -83,18 +83,12 @@ pub fn modes(matrix: &Matrix6<f64>, turn: impl Fn(C) -> (f64, f64), rounding: f6
             all.push(mode(t, t.angular, -t.growth, rounding));
         }
     }
-    // Two of the others make a mode: those along one direction, the slowest decay counts.
+    // Two of the others make a mode. With forces from a potential, a magnetic field and an even drag γ the motion is conformally
+    // symplectic (McLachlan and Perlmutter 2001): growths come in pairs whose sum is -γ, the largest with the smallest.
     real.sort_by(|a, b| b.growth.total_cmp(&a.growth));
     while !real.is_empty() {
         let first = real.remove(0);
-        let (axis, _) = swing(&first.vector);
-        let along = |k: usize| swing(&real[k].vector).0.dot(&axis).abs();
-        // Of several along it (two axes alike) the one that decays fastest: both belong to one equation of second order.
-        let alike = (0..real.len()).rev().find(|k| along(*k) > 0.99);
-        let partner = alike.or_else(|| (0..real.len()).max_by(|i, j| along(*i).total_cmp(&along(*j)).then(j.cmp(i))));
-        if let Some(partner) = partner {
-            real.remove(partner);
-        }
+        real.pop();
         let angular = if still(first) { 0.0 } else { first.angular.abs() };
         all.push(mode(first, angular, -first.growth, rounding));
     }
