@@ -54,7 +54,7 @@ struct Ground<'a> {
 /// How much of the largest multipole a smaller one must be on the sphere to be listed.
 const LISTED: f64 = 1e-9;
 
-/// Voltages that are square or sampled have no effective potential beyond this many patterns.
+/// Patterns of what oscillates that are looked at: a square wave has one, at many frequencies.
 const PATTERNS: usize = 6;
 
 /// Analyses a solved case.
@@ -258,10 +258,6 @@ fn multipoles(ground: &Ground, center: Vec3, frame: [Vec3; 3]) -> Result<TrapMul
         electrodes: each,
         driven,
     })
-}
-
-fn units_len(multipoles: &Multipoles) -> usize {
-    multipoles.coefficients.len()
 }
 
 /// The electrode that a segment meets first, the grounded plane as one more.

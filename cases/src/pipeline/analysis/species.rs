@@ -113,7 +113,7 @@ pub(super) fn species(
     if let Some(minimum) = minimum {
         let others: Vec<Vec3> = minima
             .iter()
-            .filter(|m| !std::ptr::eq(**m, minimum) && !(m.flat && minimum.flat))
+            .filter(|m| !(std::ptr::eq(**m, minimum) || m.flat && minimum.flat))
             .map(|m| m.position)
             .collect();
         let exact = &ground.driven.exact;
@@ -318,7 +318,7 @@ fn nearest_line(lines: &[Vec<Line>; 3], frequency: f64) -> Option<Line> {
     }
     let strong = lines.iter().flat_map(|along| {
         let largest = along.first().map_or(0.0, |line| line.amplitude);
-        along.iter().filter(move |line| line.amplitude > 0.02 * largest)
+        along.iter().filter(move |line| line.amplitude > 1e-3 * largest)
     });
     strong.copied().min_by(|a, b| (a.frequency - frequency).abs().total_cmp(&(b.frequency - frequency).abs()))
 }
