@@ -235,7 +235,7 @@ fn multipoles(ground: &Ground, center: Vec3, frame: [Vec3; 3]) -> Result<TrapMul
     // Channels are combinations of basis functions, and tones of channels.
     let channels = drives::channels(case, &ground.solution.basis);
     let weights = |of: &[f64]| -> Vec<f64> {
-        let mut sum = vec![0.0; units_len(&found)];
+        let mut sum = vec![0.0; found.coefficients.len()];
         for (row, w) in channels.weights.iter().zip(of) {
             sum.iter_mut().zip(row).for_each(|(s, x)| *s += w * x);
         }
