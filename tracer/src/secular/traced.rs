@@ -46,7 +46,7 @@ pub fn effective(tones: &Tones, specific_charge: f64, rate: f64, acceleration: V
 /// creeps, dies away or runs away before it has swung a few times.
 ///
 /// # Errors
-/// As [`trace`].
+/// As [`trace()`].
 pub fn traced(
     system: &System,
     grain: &Grain,
