@@ -132,9 +132,10 @@ mod tests {
     #[test]
     fn what_cannot_be_is_told() {
         // Both electrodes make the same field: two different wishes cannot come true.
-        let found = voltages(&[vec![1.0, 1.0], vec![2.0, 2.0]], &[1.0, 0.0], 100.0, 1e-6);
+        let found = voltages(&[vec![1.0, 1.0], vec![2.0, 2.0]], &[1.0, 0.0], 100.0, 1e-3);
         assert!((found.out_of_reach[0] + 0.5).abs() < 1e-9 && (found.out_of_reach[1] - 1.0).abs() < 1e-9, "{found:?}");
-        assert!((found.values[0] - found.values[1]).abs() < 1e-8);
+        // Only the weight tells them apart: rounding over its square.
+        assert!((found.values[0] - found.values[1]).abs() < 1e-8, "{found:?}");
         // A row that no electrode touches.
         let none = voltages(&[vec![0.0, 0.0]], &[2.0], 100.0, 1e-6);
         assert_eq!((none.values, none.out_of_reach), (vec![0.0, 0.0], vec![-2.0]));
