@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use field::Samples;
-use meshes::Vec3;
+use meshes::{SurfaceMesh, Vec3};
 use tracer::{Outcome, Region as FlightRegion};
 
 use super::OutputFolder;
@@ -11,7 +11,9 @@ use crate::case::{Case, Region};
 use crate::pipeline::Failure;
 use crate::pipeline::drives::Driven;
 use crate::pipeline::flights::Flights;
-use crate::plots::{Ending, Figure, PlotError, Track, axis_potential, coordinates, phase_planes};
+use crate::plots::{
+    Ending, Figure, PlotError, Track, axis_potential, coordinates, outlines, phase_planes, spectrum, tracks,
+};
 
 /// Points along the axis: two to a pixel.
 const POINTS: usize = 2000;
@@ -61,12 +63,13 @@ pub fn potential_along_axis(
     write(out, "potential", &axis_potential(title, &axis.name, &curves))
 }
 
-/// Draws the coordinates of the grains against time, and their phase planes.
+/// Draws the tracks of the grains between the electrodes, their coordinates against time, their phase planes, and the spectra of
+/// those that flew to the end, if there are.
 ///
 /// # Errors
 /// The output fails.
-pub fn of_flights(out: &mut OutputFolder, title: &str, flights: &Flights) -> Result<(), Failure> {
-    let tracks: Vec<Track> = flights
+pub fn of_flights(out: &mut OutputFolder, title: &str, flights: &Flights, mesh: &SurfaceMesh) -> Result<(), Failure> {
+    let paths: Vec<Track> = flights
         .samples
         .iter()
         .zip(&flights.traced.endings)
@@ -83,8 +86,13 @@ pub fn of_flights(out: &mut OutputFolder, title: &str, flights: &Flights) -> Res
             },
         })
         .collect();
-    write(out, "coordinates", &coordinates(title, &tracks))?;
-    write(out, "phase_planes", &phase_planes(title, &tracks))
+    write(out, "tracks", &tracks(title, &outlines(mesh), &paths))?;
+    write(out, "coordinates", &coordinates(title, &paths))?;
+    write(out, "phase_planes", &phase_planes(title, &paths))?;
+    match spectrum(title, &paths) {
+        Some(figure) => write(out, "spectrum", &figure),
+        None => Ok(()),
+    }
 }
 
 fn write(out: &mut OutputFolder, name: &str, figure: &Figure) -> Result<(), Failure> {

@@ -23,13 +23,17 @@ mod draw;
 mod legend;
 mod phase_planes;
 mod prefix;
+mod spectrum;
 mod thin;
 mod track;
+mod tracks;
 
 pub use axis_potential::axis_potential;
 pub use coordinates::coordinates;
 pub use phase_planes::phase_planes;
+pub use spectrum::spectrum;
 pub use track::{Ending, Track};
+pub use tracks::{outlines, tracks};
 
 #[cfg(test)]
 mod tests;
@@ -125,6 +129,8 @@ pub struct Panel {
     pub marks: Vec<Mark>,
     /// Drawn below the curves.
     pub bands: Vec<Band>,
+    /// As many units to a pixel on both axes: what is round looks round.
+    pub equal: bool,
 }
 
 /// One figure: panels row by row, a title above, a legend below.
