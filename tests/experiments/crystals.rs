@@ -56,7 +56,7 @@ fn exact_planar_rings() {
 /// Grains that calm down in the linear trap stand where James (1998) says: the axis has no micromotion.
 #[test]
 fn experiment_crystal_chain() {
-    // Along the axis Q U_e x²·2/(2 r0²)... : w² = 2 (Q/m) U/r0².
+    // Along the axis the source's potential is U x²/r0², hence w² = 2 (Q/m) U/r0².
     let omega = (2.0 * 1e-2 * 0.05 / 1e-4_f64).sqrt();
     for n in [2, 5] {
         let case = reference("crystals.json").into_iter().find(|c| c.id == format!("chain.N={n}")).unwrap();

@@ -58,9 +58,9 @@ fn experiment_plasma_hot_and_cold() {
             c.wigner_seitz_radius * 1e3,
             first_peak(c)
         );
-        // The bath's temperature in the mean over periods, but for what collisions in micromotion add: RF heating, which is
-        // strongest where grains pass near each other. Between 0.8 and 3 of the bath.
-        assert!(c.temperature > 0.8 * bath && c.temperature < 3.0 * bath, "{name}: {}", c.temperature);
+        // The bath's: 450 velocities at the times looked at, and some dozen of these are independent: 2 %. Grains that pass near
+        // each other take heat out of the micromotion, most where they are hot.
+        assert!((c.temperature / bath - 1.0).abs() < 0.1, "{name}: {}", c.temperature);
     }
     // Liquids and solids have neighbours at a distance, a gas has none: g rises above 2 there, and here stays near 1.
     assert!(cold.gamma > 172.0 && first_peak(&cold) > 2.0, "{cold:?}");
@@ -112,7 +112,7 @@ fn bathed(count: usize, gamma: f64) -> Vec<Vec<Sample>> {
 }
 
 /// How far from uniform the outer part of a cloud is: the grains beyond 0.7 of its radius in shells of 0.15 a, density of the
-/// emptiest over that of the fullest. One of order; a gas has no empty shell.
+/// emptiest inside of the fullest over that of the fullest. Next to nothing between shells; one where the density only rises inward.
 fn emptiest_over_fullest(samples: &[Vec<Sample>], spacing: f64, edge: f64) -> f64 {
     let width = 0.15 * spacing;
     let outermost = edge;

@@ -125,7 +125,8 @@ fn experiment_two_rings_lose_three_grains() {
     assert!(a < -0.5 * q * q && beta(a, q).is_none());
     let times: Vec<f64> = run.flights.traced.endings.iter().map(|e| e.time).collect();
     println!("they left after {times:.2?} s");
-    // Growth with the rate sqrt(|a| - q²/2) Ω/2 from 10 cm to 2.5 m and past: at least two within ten RF periods of five seconds.
+    // Growth with the rate sqrt(|a| - q²/2) Ω/2, as cosh from 10 cm to the region's edge at 2.5 m: two of the three within half as
+    // long again (they start from 5 to 19 cm).
     let rate = (-a - 0.5 * q * q).sqrt() * omega / 2.0;
     let estimate = (2.0 * 2.5 / 0.1_f64).ln() / rate;
     assert!(times.iter().filter(|t| **t < 1.5 * estimate).count() >= 2, "{times:?} {estimate}");

@@ -34,7 +34,7 @@ pub struct Line {
 /// samples or where one is not finite.
 pub fn spectrum(samples: &[f64], every: f64) -> Spectrum {
     let count = samples.len();
-    if count < FEWEST || !(every > 0.0) || samples.iter().any(|x| !x.is_finite()) {
+    if count < FEWEST || every.is_nan() || every <= 0.0 || samples.iter().any(|x| !x.is_finite()) {
         return Spectrum::default();
     }
     let window = |k: usize| 0.5 - 0.5 * (TAU * k as f64 / count as f64).cos();

@@ -15,6 +15,9 @@ use crate::plots::{
     Ending, Figure, PlotError, Track, axis_potential, coordinates, outlines, phase_planes, spectrum, tracks,
 };
 
+/// Samples to an RF period from which on a spectrum is drawn: two show its frequency, and its upper sideband lies above.
+const LEAST_OF_A_PERIOD: f64 = 3.0;
+
 /// Points along the axis: two to a pixel.
 const POINTS: usize = 2000;
 
@@ -89,7 +92,9 @@ pub fn of_flights(out: &mut OutputFolder, title: &str, flights: &Flights, mesh: 
     write(out, "tracks", &tracks(title, &outlines(mesh), &paths))?;
     write(out, "coordinates", &coordinates(title, &paths))?;
     write(out, "phase_planes", &phase_planes(title, &paths))?;
-    match spectrum(title, &paths) {
+    // Sampled more rarely, the RF's own lines are folded among the slow ones, and say nothing.
+    let often = flights.period == 0.0 || flights.every * flights.stride as f64 <= flights.period / LEAST_OF_A_PERIOD;
+    match spectrum(title, &paths).filter(|_| often) {
         Some(figure) => write(out, "spectrum", &figure),
         None => Ok(()),
     }

@@ -62,7 +62,7 @@ pub fn tracks(title: &str, outlines: &[[Vec3; 2]], tracks: &[Track]) -> Figure {
     let places = drawn.iter().flat_map(|track| &track.positions).map(|p| Vec3::from(*p));
     // Grains that left far behind would make the trap a dot: the picture holds the electrodes, or the tracks where there are none.
     let near = Near::of(outlines);
-    let seen = |r: &Vec3| near.holds(r).then(|| [r.dot(&right), r.dot(&up)]).unwrap_or([f64::NAN; 2]);
+    let seen = |r: &Vec3| if near.holds(r) { [r.dot(&right), r.dot(&up)] } else { [f64::NAN; 2] };
     let all: Vec<[f64; 2]> = outlines.iter().flatten().copied().chain(places).map(|r| seen(&r)).collect();
     let unit = axis_unit(all.iter().flatten().copied(), "m", 3);
     let scaled = |p: [f64; 2]| p.map(|v| v * unit.factor);
