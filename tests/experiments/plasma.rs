@@ -58,9 +58,9 @@ fn experiment_plasma_hot_and_cold() {
             c.wigner_seitz_radius * 1e3,
             first_peak(c)
         );
-        // The bath's: 450 velocities at the times looked at, and some dozen of these are independent: 2 %. Grains that pass near
-        // each other take heat out of the micromotion, most where they are hot.
-        assert!((c.temperature / bath - 1.0).abs() < 0.1, "{name}: {}", c.temperature);
+        // The bath's: 450 velocities, anew about every 1/C = 50 ms, three times in what is looked at: 4 %. A cold cloud still gives
+        // off some heat as it orders.
+        assert!((c.temperature / bath - 1.0).abs() < 0.2, "{name}: {}", c.temperature);
     }
     // Liquids and solids have neighbours at a distance, a gas has none: g rises above 2 there, and here stays near 1.
     assert!(cold.gamma > 172.0 && first_peak(&cold) > 2.0, "{cold:?}");

@@ -33,14 +33,14 @@ pub fn spectrum(title: &str, tracks: &[Track]) -> Option<Figure> {
     let mut panels = panels;
     let frequency = panels.len() - 1;
     "frequency (Hz)".clone_into(&mut panels[frequency].x_label);
-    let (fine, far) = (1.0 / (count as f64 * every), 0.5 / every);
+    let (fine, far) = (1.0 / (count as f64 * every), hertz(0.5 / every));
     let grains = match whole.len() {
         1 => "1 grain".to_owned(),
         n => format!("root mean square of {n} grains"),
     };
     Some(Figure {
         title: title.to_owned(),
-        subtitle: format!("{grains}; entries {fine:.3} Hz apart; faster than {far:.4} Hz is folded back"),
+        subtitle: format!("{grains}; entries {fine:.3} Hz apart; faster than {far} Hz is folded back"),
         panels,
         ..Figure::default()
     })
