@@ -60,7 +60,7 @@ fn main() {
         ],
     );
     let round = panel(
-        "three-dimensional quadrupole",
+        "3D quadrupole",
         "a along z",
         -0.5,
         &grid(-0.75, 0.25, 1600),

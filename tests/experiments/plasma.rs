@@ -116,7 +116,7 @@ fn bathed(count: usize, gamma: f64) -> Vec<Vec<Sample>> {
 fn emptiest_over_fullest(samples: &[Vec<Sample>], spacing: f64, edge: f64) -> f64 {
     let width = 0.15 * spacing;
     let outermost = edge;
-    let mut shells = vec![0.0; 14];
+    let mut shells = [0.0; 14];
     let middle: Vec3 = samples.iter().map(|t| t.last().unwrap().position).sum::<Vec3>() / samples.len() as f64;
     for track in samples {
         for s in &track[track.len() - 20..] {

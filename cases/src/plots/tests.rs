@@ -261,7 +261,7 @@ fn spectra_name_their_lines_and_their_limits() {
 
 #[test]
 fn tracks_in_space_have_equal_scales() {
-    use meshes::{Placement, Shape as Electrode, SurfaceMesh, Vec3, triangulate_to};
+    use meshes::{Placement, Shape as Electrode, SurfaceMesh, triangulate_to};
     let ball = triangulate_to(&Electrode::Sphere { radius: 2e-3 }, 2000).unwrap().0;
     let mesh = SurfaceMesh::assemble([("ball".to_owned(), ball.placed(&Placement::default()).unwrap())]);
     let edges = super::outlines(&mesh);
