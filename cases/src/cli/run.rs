@@ -45,7 +45,7 @@ pub(super) fn run(session: &Session, resume: bool, trace: bool) -> Result<(), Fa
         session.progress.stage("write");
         let start = Instant::now();
         tracks::write(&mut out, &flights, &ready.ensemble)?;
-        pictures::of_flights(&mut out, &session.title(), &flights)?;
+        pictures::of_flights(&mut out, &session.title(), &flights, mesh)?;
         let trace = TraceSummary::new(case, &flights);
         if trace.outcomes.unstable > 0 {
             session.progress.warning(&format!(

@@ -63,7 +63,8 @@ pub fn potential_maps(
                 y_label: length.label(axes[1]),
                 curves,
                 marks,
-                bands: Vec::new(),
+                equal: true,
+                ..Panel::default()
             }
         })
         .collect();

@@ -1,11 +1,10 @@
 //! Motion close to an equilibrium: its frequencies, whether it is held, and how fast it dies away.
 //!
 //! Three ways to the same numbers: the transition matrix over a period of the real field ([`Neighbourhood::equilibrium`]), Mathieu's
-//! equation on each axis by itself ([`Mathieu`]), and the spectrum of a grain that was traced ([`spectrum`]).
+//! equation on each axis by itself ([`Mathieu`]), and the spectrum of a grain that was traced ([`traced()`]).
 
 pub mod mathieu;
 pub mod modes;
-pub mod spectrum;
 pub mod traced;
 
 use field::Waveform;

@@ -3,8 +3,8 @@
 use field::analysis::{Effective, Square, Tones};
 use meshes::Vec3;
 
-use super::spectrum::{Line, lines};
 use super::{Equilibrium, Mode};
+use crate::spectrum::{Measured, measured};
 use crate::{Ensemble, Grain, Method, Options, System, TraceError, Trajectories, trace};
 
 /// Periods of the RF, at most: some seconds of flight where the field is dear.
@@ -14,9 +14,10 @@ const MOST_PERIODS: f64 = 600.0;
 const TURNS: f64 = 30.0;
 const FEWEST: f64 = 6.0;
 
-/// Samples of an RF period, or of the fastest mode of a static field: lines up to half the RF's frequency stay clear of the images
-/// of its harmonics.
+/// Samples of an RF period: lines up to half the RF's frequency stay clear of the images of its harmonics.
 const SAMPLES: f64 = 8.0;
+/// And of the fastest mode of a static field: two thirds of the fewest turns make a spectrum.
+const STATIC_SAMPLES: f64 = 16.0;
 
 /// Decay e^(-x/2), at most, of an amplitude that is looked at.
 const DECAY: f64 = 12.0;
@@ -54,7 +55,7 @@ pub fn traced(
     axes: &[Vec3; 3],
     amplitude: f64,
     period: Option<f64>,
-) -> Result<[Vec<Line>; 3], TraceError> {
+) -> Result<[Vec<Measured>; 3], TraceError> {
     let rate = system.drag_rate(grain.mass, grain.radius).unwrap_or(0.0);
     let swinging: Vec<&Mode> = equilibrium.modes.iter().filter(|m| m.frequency > 0.0).collect();
     let fastest = swinging.iter().map(|m| m.frequency).fold(0.0, f64::max);
@@ -72,7 +73,7 @@ pub fn traced(
     if swinging.is_empty() || duration * fastest < FEWEST || growth * duration > 3.0 {
         return Ok([Vec::new(), Vec::new(), Vec::new()]);
     }
-    let every = period.unwrap_or(1.0 / fastest) / SAMPLES;
+    let every = period.map_or(1.0 / (STATIC_SAMPLES * fastest), |period| period / SAMPLES);
     let mut ensemble = Ensemble::new();
     let start = Grain {
         position: equilibrium.position + (axes[0] + axes[1] + axes[2]) * amplitude,
@@ -91,14 +92,14 @@ pub fn traced(
     let kept = Trajectories::default();
     trace(system, &ensemble, &options, &kept)?;
     let samples = kept.into_samples().swap_remove(0);
-    let below = period.map_or(0.5 * SAMPLES * fastest, |period| 0.5 / period);
+    let below = period.map_or(0.5 * STATIC_SAMPLES * fastest, |period| 0.5 / period);
     Ok(axes.map(|axis| {
         let undamped = |t: f64| if system.magnetic_field == Vec3::zeros() { (0.5 * rate * t).exp() } else { 1.0 };
         let away = samples.iter().map(|s| (s.position - equilibrium.position).dot(&axis) * undamped(s.time));
         // The last sample is at the end of the flight, not on the beat.
         let mut signal: Vec<f64> = away.collect();
         signal.pop();
-        lines(&signal, every, below, 3)
+        measured(&signal, every, below, 3)
     }))
 }
 

@@ -6,8 +6,8 @@ use field::Samples;
 use field::analysis::{Effective, Expansion, Opening, Well, voltages, well};
 use meshes::Vec3;
 use nalgebra::Matrix3;
-use tracer::secular::spectrum::Line;
 use tracer::secular::{Equilibrium, Mathieu, Mode, Neighbourhood, common_period, effective, traced};
+use tracer::spectrum::Measured;
 use tracer::{Grain, System};
 
 use super::report::{
@@ -312,7 +312,7 @@ fn secular(
 }
 
 /// The line of the motion along any axis that is nearest to a frequency, of those that are not lost beside the strongest.
-fn nearest_line(lines: &[Vec<Line>; 3], frequency: f64) -> Option<Line> {
+fn nearest_line(lines: &[Vec<Measured>; 3], frequency: f64) -> Option<Measured> {
     if frequency == 0.0 {
         return None;
     }
