@@ -1,5 +1,6 @@
 //! What an analysis looks at.
 
+use field::Waveform;
 use meshes::Vec3;
 use serde::Serialize;
 
@@ -26,6 +27,56 @@ pub struct Analysis {
     pub plane_normal: Option<Vec3>,
     /// Voltages that are asked for.
     pub wish: Option<Wish>,
+    /// A chart of stability.
+    pub chart: Option<Chart>,
+}
+
+/// A chart of stability over two voltages, or over a and q.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Chart {
+    /// To the right, upwards.
+    pub axes: [ChartAxis; 2],
+    /// What varies.
+    #[serde(skip)]
+    pub voltages: ChartVoltages,
+    /// Grains that are traced.
+    pub grains: Option<ChartGrains>,
+}
+
+/// An axis of a chart.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChartAxis {
+    /// The key it varies; `q` or `a`.
+    pub key: String,
+    /// In which its values are; may be empty.
+    pub unit: String,
+    /// First value.
+    pub from: f64,
+    /// Last value.
+    pub to: f64,
+    /// How many, at least 2.
+    pub steps: usize,
+}
+
+/// What the axes of a chart do to the voltages. It follows from the rest of the case.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ChartVoltages {
+    /// Scale all that oscillates, and all that is constant.
+    Scaled,
+    /// Of each electrode (a charge where it floats) and source at the corners of the chart: both first, x last, y last, both
+    /// last. Between them voltages are bilinear.
+    Corners(Box<[Vec<Waveform>; 4]>),
+}
+
+/// Grains of a chart.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ChartGrains {
+    /// Start off the centre, along each principal axis, m; `None`: to be chosen.
+    pub distance: Option<f64>,
+    /// Periods they are traced for.
+    pub periods: usize,
+    /// How many along each axis of the chart.
+    pub steps: usize,
 }
 
 /// The field that constant voltages are to make.

@@ -8,10 +8,11 @@ mod settings;
 
 use std::path::Path;
 
+use field::Waveform;
 use serde::Serialize;
 
 pub use crate::keys::settings::{Gas, Integrator, Method, Reflection, Solver};
-pub use analysis::{Analysis, WantedMultipole, Wish};
+pub use analysis::{Analysis, Chart, ChartAxis, ChartGrains, ChartVoltages, WantedMultipole, Wish};
 pub use electrode::{Drive, Electrode, ElectrodeShape, ImportedMesh, MeshFormat, Source, SourceKind};
 pub use parts::CaseParts;
 pub use settings::{
@@ -52,6 +53,16 @@ pub struct Case {
 }
 
 impl Case {
+    /// What each electrode, then each source, is given: a voltage, a strength, or a charge where it floats; and which float.
+    pub fn given(&self) -> (Vec<Waveform>, Vec<bool>) {
+        let electrodes = self.electrodes.iter().map(|e| match &e.drive {
+            Drive::Voltage(waveform) => (waveform.clone(), false),
+            Drive::Charge(charge) => (Waveform::constant(*charge), true),
+        });
+        let sources = self.sources.iter().map(|s| (s.waveform.clone(), false));
+        electrodes.chain(sources).unzip()
+    }
+
     /// Reads a case file. `sets` are changes from the command line, as `electrode.left.dc=7 V`, applied in order.
     ///
     /// # Errors

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::sweep::End;
 use super::value::{Count, DirectionKeys, Fraction, Number, Vector, Whole};
 use crate::quantity::Positive;
 use crate::quantity::kinds::{ElectricField, Length, Voltage};
@@ -30,6 +31,8 @@ pub(crate) struct AnalysisKeys {
     pub plane: Option<PlaneKeys>,
     /// Voltages that are asked for.
     pub wish: Option<WishKeys>,
+    /// Where the first grains stay, over two voltages or over a and q.
+    pub chart: Option<ChartKeys>,
 }
 
 /// A plane to draw maps in.
@@ -73,4 +76,43 @@ pub(crate) struct MultipoleKeys {
     pub sine: Option<bool>,
     /// In V/m^l.
     pub value: Number,
+}
+
+/// A chart of stability.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ChartKeys {
+    /// What varies to the right.
+    pub x: ChartAxisKeys,
+    /// What varies upwards.
+    pub y: ChartAxisKeys,
+    /// Grains that are traced, from off the centre; left out: none.
+    pub grains: Option<ChartGrainsKeys>,
+}
+
+/// An axis of a chart.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ChartAxisKeys {
+    /// The path of a key that sets a voltage, as "electrode.ring.dc" or "drive.main.amplitude"; or "q" (to the right) and "a"
+    /// (upwards), which scale all that oscillates and all that is constant.
+    pub key: String,
+    /// The first value: a number, or a string with a unit.
+    pub from: End,
+    /// The last value, in the same unit.
+    pub to: End,
+    /// How many values, both ends counted, up to 400; left out: 40.
+    pub steps: Option<Whole<2>>,
+}
+
+/// Grains of a chart.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ChartGrainsKeys {
+    /// How far from the centre they start, along each principal axis; left out: a tenth of the way to the nearest electrode.
+    pub distance: Option<Positive<Length>>,
+    /// How many periods of the slowest voltage they must stay; left out: 200.
+    pub periods: Option<Count>,
+    /// How many to the right and upwards, up to 100; left out: 12.
+    pub steps: Option<Whole<2>>,
 }

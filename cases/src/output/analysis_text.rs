@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::summary::metres;
-use crate::pipeline::analysis::report::{Null, Report, Species, UnitMultipoles, WishReport};
+use crate::pipeline::analysis::report::{ChartReport, Null, Report, Species, UnitMultipoles, WishReport};
 
 /// Points that are listed of each kind; all are in the file.
 const LISTED: usize = 8;
@@ -28,6 +28,9 @@ pub fn text(report: &Report, folder: &Path) -> String {
     report.species.iter().for_each(|one| species(&mut text, one));
     if let Some(found) = &report.wish {
         wish(&mut text, found);
+    }
+    if let Some(found) = &report.chart {
+        chart(&mut text, found);
     }
     for warning in &report.warnings {
         let _ = writeln!(text, "warning: {warning}");
@@ -231,5 +234,31 @@ fn wish(text: &mut String, found: &WishReport) {
     }
     if !found.at_limit.is_empty() {
         let _ = writeln!(text, "{:<12} at the limit: {}", "", found.at_limit.join(", "));
+    }
+}
+
+fn chart(text: &mut String, found: &ChartReport) {
+    let axis = |a: &crate::case::ChartAxis| format!("{} from {} to {} {}", a.key, a.from, a.to, a.unit);
+    let _ = writeln!(text, "{:<12} {}; {}", "chart", axis(&found.x).trim(), axis(&found.y).trim());
+    let rows = [0, found.rows.len() / 2, found.rows.len().saturating_sub(1)].map(|n| found.rows.get(n));
+    for row in rows.into_iter().flatten() {
+        let list = |edges: &[f64]| match edges {
+            [] => "none".to_owned(),
+            edges => edges.iter().map(|x| format!("{x:.5}")).collect::<Vec<_>>().join(", "),
+        };
+        let (here, ideal) = (list(&row.edges), list(&row.ideal_edges));
+        let _ = writeln!(text, "{:<12} at {:.5}: edges {here}; of an ideal trap {ideal}", "", row.y);
+    }
+    if let Some(distance) = found.distance {
+        let _ = writeln!(
+            text,
+            "{:<12} grains from {} off: {} of {} stay, {} beyond the edge; {} lost before it",
+            "",
+            metres(distance),
+            found.retained,
+            found.traced.len(),
+            found.retained_beyond_the_edge,
+            found.lost_before_the_edge
+        );
     }
 }

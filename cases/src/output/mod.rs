@@ -1,5 +1,6 @@
 //! What a run writes: VTK, CSV, plots, the summary.
 
+pub mod analysis_chart;
 pub mod analysis_pictures;
 pub mod analysis_text;
 pub mod electrodes;

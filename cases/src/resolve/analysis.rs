@@ -45,6 +45,8 @@ pub(super) fn analysis(at: &At, keys: &AnalysisKeys, electrodes: &[Electrode]) -
             .map(|axis| direction(&at.key("plane").key("axis"), axis))
             .transpose()?,
         wish: keys.wish.as_ref().map(|wish| self::wish(&at.key("wish"), wish, electrodes, order)).transpose()?,
+        // It needs the rest of the case.
+        chart: None,
     })
 }
 

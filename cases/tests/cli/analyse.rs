@@ -299,3 +299,64 @@ fn law_wishes_come_true() {
     assert_eq!(limited["wish"]["at_limit"].as_array().unwrap().len(), 2);
     assert!((number(&limited["wish"]["volts"]["left"]) - 2.0).abs() < 1e-12);
 }
+
+/// The edges of a chart's row that is nearest to a value of y.
+fn edges(chart: &Value, y: f64, list: &str) -> Vec<f64> {
+    let rows = chart["rows"].as_array().unwrap();
+    let away = |row: &Value| (number(&row["y"]) - y).abs();
+    numbers(&rows.iter().min_by(|a, b| away(a).total_cmp(&away(b))).unwrap()[list])
+}
+
+/// The chart of an ideal trap: ejection at q = 0.908046 where a = 0, and at the tip of the region no q is stable; grains leave where
+/// the linear motion does, as there is no other.
+#[test]
+fn exact_chart_of_the_ideal_trap() {
+    let rf = "r0 = 1\ndc = 5e-5\nrf = { amplitude = 0.1, frequency = \"1 rad/s\", phase = \"180 deg\" }";
+    let chart = "[analysis.chart]\nx = { key = \"q\", from = 0, to = 1.4, steps = 71 }\ny = { key = \"a\", from = -0.7, to = 0.3, steps = 51 }\ngrains = { steps = 8, periods = 150 }\n";
+    let object = analysed(&(ideal(rf, "") + chart), &[]);
+    let chart = &object["chart"];
+    let edge = |y: f64, list: &str| *edges(chart, y, list).last().unwrap();
+    for list in ["edges", "ideal_edges"] {
+        // Straight between values 0.02 apart, of a half trace whose bend there is about 1: 0.02²/8 of q.
+        assert!((edge(0.0, list) - 0.908_046).abs() < 2e-4, "{}", edge(0.0, list));
+        assert!(edges(chart, -0.7, list).is_empty(), "below the tip at a = -0.671");
+    }
+    for row in chart["rows"].as_array().unwrap() {
+        let (own, ideal) = (numbers(&row["edges"]), numbers(&row["ideal_edges"]));
+        assert_eq!(own.len(), ideal.len(), "{row}");
+        // One field, two ways: a matrix of six by steps of order four, half a trace on each axis.
+        assert!(own.iter().zip(&ideal).all(|(a, b)| (a - b).abs() < 1e-4), "{row}");
+    }
+    let grains = chart["traced"].as_array().unwrap();
+    let stay = grains.iter().filter(|g| g["outcome"] == "retained").count();
+    assert!(grains.len() == 64 && stay > 5 && stay < 40, "{stay}");
+    assert!(grains.iter().all(|g| g["outcome"] == "retained" || g["point"].is_array()));
+    // A grain next to the edge grows too slowly to be lost in time, or is told by the nearest value: of 64 a few.
+    let wrong = number(&chart["retained_beyond_the_edge"]) + number(&chart["lost_before_the_edge"]);
+    assert!(wrong <= 4.0, "{wrong} of 64 stand on the other side");
+}
+
+/// The chart of real electrodes: the cut-off hyperbolic trap ejects between 135 V (q = 0.9) and 137.2 V (0.915), in linear motion,
+/// as an ideal trap of its curvatures does.
+#[test]
+fn chart_of_the_hyperbolic_trap() {
+    let scratch = Scratch::new();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("paul_trap/case.toml");
+    let text = std::fs::read_to_string(path).unwrap()
+        + "[analysis]\nnodes = 8000\n[analysis.chart]\nx = { key = \"drive.main.amplitude\", from = \"100 V\", to = \"150 V\", steps = 26 }\ny = { key = \"electrode.ring.dc\", from = \"-4 V\", to = \"4 V\", steps = 9 }\n";
+    let (case, out) = (scratch.file("trap.toml", &text), scratch.at("out"));
+    let object = graintrap(&["analyse", &case, "--json", "-o", &out]).done().json();
+    let chart = &object["chart"];
+    let own = *edges(chart, 0.0, "edges").last().unwrap();
+    assert!(own > 135.0 && own < 137.2, "{own} V");
+    // q is proportional to the voltage: the limit over q at the case's 135 V.
+    let q = numbers(&object["mathieu"]["q"]).iter().fold(0.0_f64, |m, q| m.max(q.abs()));
+    // Straight between values 2 V apart: 1e-4 of the voltage.
+    assert!((own / (135.0 * 0.908_046 / q) - 1.0).abs() < 3e-4, "{own} V, q {q}");
+    let found = contents(Path::new(&out));
+    for name in ["stability_chart.svg", "stability_chart.png", "stability_chart.csv"] {
+        assert!(is_whole(name, found.get(name).unwrap_or_else(|| panic!("there is no {name}"))), "{name}");
+    }
+    let rows = String::from_utf8(found["stability_chart.csv"].clone()).unwrap();
+    assert_eq!(rows.lines().count(), 1 + 26 * 9);
+}

@@ -1,7 +1,11 @@
 //! What an analysis found, as `analysis.json` holds it. SI throughout, but where a key says otherwise.
 
 use field::analysis::CriticalPoint;
+use meshes::Vec3;
 use serde::Serialize;
+
+use super::chart::{Scan, edges};
+use crate::case::{Chart, ChartAxis, GrainGroup};
 
 /// What `graintrap analyse` prints as JSON.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -39,6 +43,9 @@ pub struct Report {
     /// What came of `[analysis.wish]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wish: Option<WishReport>,
+    /// What came of `[analysis.chart]`; all of it is in `stability_chart.csv`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chart: Option<ChartReport>,
     /// Wall-clock time of the analysis, s.
     pub seconds: f64,
     /// What a person should know.
@@ -351,4 +358,111 @@ pub struct Wanted {
     pub verdict: &'static str,
     /// Estimated error of what was got, V/m^l.
     pub error_estimate: f64,
+}
+
+/// A chart of stability in short.
+#[derive(Clone, Debug, Serialize)]
+pub struct ChartReport {
+    /// To the right.
+    pub x: ChartAxis,
+    /// Upwards.
+    pub y: ChartAxis,
+    /// Whose charge and mass.
+    pub grains: String,
+    /// Where the linear motion was looked at, m.
+    pub center: [f64; 3],
+    /// Principal axes of what oscillates.
+    pub axes: [[f64; 3]; 3],
+    /// The one of them, from 1, whose q is largest: a and q of the chart are those along it.
+    pub main_axis: usize,
+    /// Longest period, s.
+    pub period: f64,
+    /// For each value of y.
+    pub rows: Vec<ChartRow>,
+    /// Start of traced grains off the centre, along each axis, m.
+    pub distance: Option<f64>,
+    /// Traced grains, row by row.
+    pub traced: Vec<ChartGrain>,
+    /// Traced grains that stayed.
+    pub retained: usize,
+    /// And stayed where the linear motion does not.
+    pub retained_beyond_the_edge: usize,
+    /// Lost where the linear motion stays bounded.
+    pub lost_before_the_edge: usize,
+}
+
+/// Where a row of a chart passes into or out of stability, straight between its values.
+#[derive(Clone, Debug, Serialize)]
+pub struct ChartRow {
+    /// Value of y.
+    pub y: f64,
+    /// Values of x at the edges of the linear motion at the centre.
+    pub edges: Vec<f64>,
+    /// And of an ideal trap with this a and q.
+    pub ideal_edges: Vec<f64>,
+}
+
+/// A traced grain of a chart.
+#[derive(Clone, Debug, Serialize)]
+pub struct ChartGrain {
+    /// Value of x.
+    pub x: f64,
+    /// Value of y.
+    pub y: f64,
+    /// `retained`, the name of the electrode it struck, or `left_region`.
+    pub outcome: String,
+    /// When, s.
+    pub time: f64,
+    /// Where it was lost, m.
+    pub point: Option<[f64; 3]>,
+}
+
+impl ChartReport {
+    /// Of a scan about a centre, with what else it says.
+    pub fn new(chart: &Chart, group: &GrainGroup, scan: &Scan, about: &ChartCenter) -> Self {
+        let [xs, ys] = &scan.values;
+        let row = |(j, y): (usize, &f64)| {
+            let edges_of = |list: &[f64]| edges(xs, |i| list[j * xs.len() + i]);
+            ChartRow { y: *y, edges: edges_of(&scan.floquet), ideal_edges: edges_of(&scan.ideal) }
+        };
+        let stayed = |grain: &&ChartGrain| grain.outcome == "retained";
+        // Of the value next to the grain's.
+        let bounded = |grain: &ChartGrain| {
+            let next = |list: &[f64], value: f64| {
+                let place = (value - list[0]) / (list[list.len() - 1] - list[0]) * (list.len() - 1) as f64;
+                (place.round() as usize).min(list.len() - 1)
+            };
+            scan.floquet[next(ys, grain.y) * xs.len() + next(xs, grain.x)] < 0.0
+        };
+        Self {
+            x: chart.axes[0].clone(),
+            y: chart.axes[1].clone(),
+            grains: group.name.clone(),
+            center: about.center.into(),
+            axes: about.axes.map(Into::into),
+            main_axis: about.main + 1,
+            period: about.period,
+            rows: ys.iter().enumerate().map(row).collect(),
+            distance: chart.grains.map(|_| about.distance),
+            retained: scan.grains.iter().filter(stayed).count(),
+            retained_beyond_the_edge: scan.grains.iter().filter(|g| stayed(g) && !bounded(g)).count(),
+            lost_before_the_edge: scan.grains.iter().filter(|g| !stayed(g) && bounded(g)).count(),
+            traced: scan.grains.clone(),
+        }
+    }
+}
+
+/// Where and how a chart was made.
+#[derive(Clone, Copy, Debug)]
+pub struct ChartCenter {
+    /// m.
+    pub center: Vec3,
+    /// Principal axes of what oscillates.
+    pub axes: [Vec3; 3],
+    /// The one with the largest q.
+    pub main: usize,
+    /// Start of grains along each axis, m.
+    pub distance: f64,
+    /// s.
+    pub period: f64,
 }

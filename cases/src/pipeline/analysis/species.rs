@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use field::Samples;
-use field::analysis::{Effective, Expansion, Opening, Well, voltages, well};
+use field::analysis::{Effective, Expansion, Opening, Tones, Well, voltages, well};
+use field::{DrivenField, Samples};
 use meshes::Vec3;
 use nalgebra::Matrix3;
 use tracer::secular::{Equilibrium, Mathieu, Mode, Neighbourhood, common_period, effective, traced};
@@ -14,7 +14,7 @@ use super::report::{
     Compensation, Depth, MathieuReport, Micromotion, ModeReport, Offset, Point, SecularReport, Species,
 };
 use super::{CriticalPoint, Failure, Ground, Jet, Kind, Reporter, critical_points_on, first_wall, polish, values_on};
-use crate::case::{Drive, GROUND, GrainGroup};
+use crate::case::{Case, Drive, GROUND, GrainGroup};
 use crate::pipeline::flights;
 
 /// Elementary charge, C.
@@ -32,7 +32,8 @@ pub(super) fn species(
 ) -> Result<(Species, Effective), Failure> {
     let (case, space) = (ground.case, &ground.space);
     let specific = group.charge / group.mass;
-    let system = system(ground);
+    let region = tracer::Region { min: ground.bounds.min, max: ground.bounds.max };
+    let system = alone(case, ground.driven.field.clone(), region);
     let rate = system.drag_rate(group.mass, group.radius).unwrap_or(0.0);
     let acceleration = case.forces.gravity + case.forces.constant / group.mass;
     let potential = effective(&ground.tones, specific, rate, acceleration);
@@ -147,10 +148,7 @@ impl Species {
 }
 
 /// What a grain alone and without noise flies through.
-fn system(ground: &Ground) -> System {
-    let case = ground.case;
-    let field = ground.driven.field.clone();
-    let region = flights_region(ground);
+pub(super) fn alone(case: &Case, field: DrivenField, region: tracer::Region) -> System {
     let whole = flights::system(case, field.clone(), None, None, region);
     let mut alone = System::new().with_field(field);
     if case.forces.gravity != Vec3::zeros() {
@@ -163,12 +161,8 @@ fn system(ground: &Ground) -> System {
     alone.with_magnetic_field(case.forces.magnetic_field)
 }
 
-fn flights_region(ground: &Ground) -> tracer::Region {
-    tracer::Region { min: ground.bounds.min, max: ground.bounds.max }
-}
-
 /// Curvatures, largest first, with their axes.
-fn principal(hessian: &Matrix3<f64>) -> ([f64; 3], [Vec3; 3]) {
+pub(super) fn principal(hessian: &Matrix3<f64>) -> ([f64; 3], [Vec3; 3]) {
     let eigen = hessian.symmetric_eigen();
     let mut order = [0, 1, 2];
     order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
@@ -177,6 +171,28 @@ fn principal(hessian: &Matrix3<f64>) -> ([f64; 3], [Vec3; 3]) {
         if axis[axis.iamax()] < 0.0 { -axis } else { axis }
     };
     (order.map(|k| eigen.eigenvalues[k]), order.map(axis))
+}
+
+/// Matrices of a, and of q with the cosine and the sine of a frequency (Hz).
+pub(super) fn bends(tones: &Tones, jets: &[Jet], specific: f64, frequency: f64) -> [Matrix3<f64>; 3] {
+    let omega = TAU * frequency;
+    let scale = 4.0 * specific / (omega * omega);
+    let bend = |weights: &[f64]| Jet::sum(jets, weights).hessian;
+    let tone = tones.tones.iter().find(|t| t.frequency == frequency);
+    let [cosine, sine] =
+        tone.map_or([Matrix3::zeros(); 2], |t| [bend(&t.cosine) * (-0.5 * scale), bend(&t.sine) * (-0.5 * scale)]);
+    [bend(&tones.constant) * scale, cosine, sine]
+}
+
+/// a and q on three axes.
+pub(super) fn parameters([statics, cosine, sine]: &[Matrix3<f64>; 3], axes: &[Vec3; 3]) -> ([f64; 3], [f64; 3]) {
+    let along = |m: &Matrix3<f64>, axis: &Vec3| axis.dot(&(m * axis));
+    let q = |axis: &Vec3| {
+        let (c, s) = (along(cosine, axis), along(sine, axis));
+        // The larger part gives the sign.
+        c.hypot(s).copysign(if c.abs() >= s.abs() { c } else { s })
+    };
+    ([0, 1, 2].map(|k| along(statics, &axes[k])), [0, 1, 2].map(|k| q(&axes[k])))
 }
 
 fn mathieu(
@@ -191,19 +207,11 @@ fn mathieu(
     let jets = expansion.jets(center);
     let omega = TAU * frequency;
     let scale = 4.0 * specific / (omega * omega);
-    let bend = |weights: &[f64]| Jet::sum(&jets, weights).hessian;
-    let statics = bend(&ground.tones.constant) * scale;
     let tone = ground.tones.tones.iter().find(|t| t.frequency == frequency);
-    let none = Matrix3::zeros();
-    let (cosine, sine) =
-        tone.map_or((none, none), |t| (bend(&t.cosine) * (-0.5 * scale), bend(&t.sine) * (-0.5 * scale)));
+    let bends = bends(&ground.tones, &jets, specific, frequency);
+    let [statics, cosine, sine] = bends;
     let along = |m: &Matrix3<f64>, i: usize, j: usize| axes[i].dot(&(m * axes[j]));
-    let a = [0, 1, 2].map(|k| along(&statics, k, k));
-    let q = [0, 1, 2].map(|k| {
-        let (c, s) = (along(&cosine, k, k), along(&sine, k, k));
-        // The larger part gives the sign.
-        c.hypot(s).copysign(if c.abs() >= s.abs() { c } else { s })
-    });
+    let (a, q) = parameters(&bends, &axes);
     let k = rate / omega;
     let pairs = [(0, 1), (0, 2), (1, 2)];
     let coupling =
