@@ -321,7 +321,8 @@ fn exact_chart_of_the_ideal_trap() {
         assert!((edge(0.0, list) - 0.908_046).abs() < 2e-4, "{}", edge(0.0, list));
         assert!(edges(chart, -0.7, list).is_empty(), "below the tip at a = -0.671");
     }
-    for row in chart["rows"].as_array().unwrap() {
+    // At a = 0 and q = 0 nothing acts at all: on which side that is, rounding tells.
+    for row in chart["rows"].as_array().unwrap().iter().filter(|row| number(&row["y"]).abs() > 1e-9) {
         let (own, ideal) = (numbers(&row["edges"]), numbers(&row["ideal_edges"]));
         assert_eq!(own.len(), ideal.len(), "{row}");
         // One field, two ways: a matrix of six by steps of order four, half a trace on each axis.
