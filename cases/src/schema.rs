@@ -27,8 +27,10 @@ pub fn schema() -> Value {
     // Some field there must be.
     schema["anyOf"] = json!([{ "required": ["electrode"] }, { "required": ["source"] }]);
     schema["dependentRequired"] = json!({ "grains": ["trace"] });
-    if let Some(table) = schema.pointer_mut("/$defs/TableKeys") {
-        table["dependentRequired"] = json!({ "min": ["max"], "max": ["min"] });
+    for name in ["TableKeys", "AnalysisKeys"] {
+        if let Some(table) = schema.pointer_mut(&format!("/$defs/{name}")) {
+            table["dependentRequired"] = json!({ "min": ["max"], "max": ["min"] });
+        }
     }
     if let Some(forces) = schema.pointer_mut("/$defs/ForceKeys") {
         forces["dependentRequired"] = json!({ "langevin": ["drag"] });
@@ -92,9 +94,16 @@ fn settings_keys() -> Vec<(String, Vec<String>)> {
         let properties = schema.pointer(pointer).and_then(Value::as_object);
         (name.to_owned(), properties.map(|keys| keys.keys().cloned().collect()).unwrap_or_default())
     };
-    [("field", "Field"), ("table", "Table"), ("forces", "Force"), ("trace", "Trace"), ("output", "Output")]
-        .map(|(name, keys)| table(name, &format!("/$defs/{keys}Keys/properties")))
-        .into()
+    [
+        ("field", "Field"),
+        ("analysis", "Analysis"),
+        ("table", "Table"),
+        ("forces", "Force"),
+        ("trace", "Trace"),
+        ("output", "Output"),
+    ]
+    .map(|(name, keys)| table(name, &format!("/$defs/{keys}Keys/properties")))
+    .into()
 }
 
 /// The schema of a table that is read as two structs: each variant of the second with the keys of the first.

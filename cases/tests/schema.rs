@@ -39,7 +39,7 @@ fn schema_accepts_what_the_reader_accepts() {
 
 /// What only the reader can refuse: rules between keys, units, other files, and numbers that JSON has no words for.
 const BEYOND_A_SCHEMA: &str = "\
-    amplitude_in_coulombs axis_without_direction disc_hole_too_large drive_circle drive_is_a_voltage drive_phase_of_ramp \
+    analysis_order analysis_multipole_m analysis_wish_of_nothing analysis_wish_electrode analysis_wish_in_volts amplitude_in_coulombs axis_without_direction disc_hole_too_large drive_circle drive_is_a_voltage drive_phase_of_ramp \
     drive_unknown drive_unknown_in_table field_too_many_panels \
     grains_box_inside_out grains_count_missing grains_count_of_points grains_density_of_points \
     grains_file_and_speed grains_file_columns grains_file_empty grains_file_folder grains_file_letters grains_file_semicolons \

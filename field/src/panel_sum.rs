@@ -135,6 +135,12 @@ impl PanelSum {
         self.sources.iter().position(|s| s.is_singular_at(point))
     }
 
+    /// Distance of the nearest source whose field is infinite somewhere, and of the grounded plane, m.
+    pub(crate) fn distance_of_sources(&self, point: &Vec3) -> f64 {
+        let plane = self.ground.iter().map(|plane| plane.height(point).abs());
+        self.sources.iter().map(|s| s.distance_of_singularity(point)).chain(plane).fold(f64::INFINITY, f64::min)
+    }
+
     /// Adds potential and gradient of the closed-form sources in every channel at a point.
     pub(crate) fn add_sources(&self, point: &Vec3, potential: &mut [f64], gradient: &mut [Vec3]) {
         for (s, source) in self.sources.iter().enumerate() {

@@ -107,6 +107,19 @@ impl Source {
         Some(Quadratic { constant, gradient: slope - pull, hessian })
     }
 
+    /// Distance of the nearest point at which the field is infinite, m.
+    pub fn distance_of_singularity(&self, point: &Vec3) -> f64 {
+        let d = point - self.center;
+        match self.kind {
+            SourceKind::Point => d.norm(),
+            SourceKind::ThinRing { radius } => {
+                let [e1, e2, e3] = &self.frame;
+                (d.dot(e1).hypot(d.dot(e2)) - radius).hypot(d.dot(e3))
+            }
+            _ => f64::INFINITY,
+        }
+    }
+
     /// Whether a point is where the field is infinite.
     pub fn is_singular_at(&self, point: &Vec3) -> bool {
         match self.kind {

@@ -86,6 +86,14 @@ impl Waveform {
 }
 
 impl WaveformPart {
+    /// Its amplitude, V; the factor of samples.
+    pub fn amplitude_mut(&mut self) -> &mut f64 {
+        match self {
+            Self::Sine { amplitude, .. } | Self::Square { amplitude, .. } | Self::Ramp { amplitude, .. } => amplitude,
+            Self::Sampled { scale, .. } => scale,
+        }
+    }
+
     /// Value at time `t` (s), V.
     pub fn value(&self, t: f64) -> f64 {
         match self {

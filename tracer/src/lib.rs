@@ -87,10 +87,16 @@
 //!
 //! The mutual force of some thousand grains is summed pair by pair, that of more by multipoles to an accuracy
 //! ([`Coulomb`]). [`stability`] maps where motions in a quadrupole stay bounded, without flying grains at all.
+//!
+//! # What flights are judged by
+//!
+//! [`spectrum`] finds the lines of a motion, [`plasma`] tells how strongly a cloud is coupled, and [`crystal`] where equal charges
+//! rest in a harmonic well, and how they swing there.
 
 pub mod checkpoint;
 pub mod cloud;
 pub mod constants;
+pub mod crystal;
 pub mod drag;
 pub mod error;
 pub mod estimate;
@@ -101,6 +107,9 @@ pub mod grains;
 pub mod observer;
 pub mod options;
 pub mod outcome;
+pub mod plasma;
+pub mod secular;
+pub mod spectrum;
 pub mod stability;
 pub mod stream;
 pub mod system;

@@ -1,5 +1,6 @@
 //! A case as the pipeline sees it: complete, checked, in SI.
 
+mod analysis;
 mod electrode;
 mod foreign;
 mod parts;
@@ -7,9 +8,11 @@ mod settings;
 
 use std::path::Path;
 
+use field::Waveform;
 use serde::Serialize;
 
 pub use crate::keys::settings::{Gas, Integrator, Method, Reflection, Solver};
+pub use analysis::{Analysis, Chart, ChartAxis, ChartGrains, ChartVoltages, WantedMultipole, Wish};
 pub use electrode::{Drive, Electrode, ElectrodeShape, ImportedMesh, MeshFormat, Source, SourceKind};
 pub use parts::CaseParts;
 pub use settings::{
@@ -43,11 +46,23 @@ pub struct Case {
     pub trace: Option<TraceSettings>,
     /// What is written.
     pub output: Output,
+    /// What an analysis looks at.
+    pub analysis: Analysis,
     /// What a study varies.
     pub sweep: Option<Sweep>,
 }
 
 impl Case {
+    /// What each electrode, then each source, is given: a voltage, a strength, or a charge where it floats; and which float.
+    pub fn given(&self) -> (Vec<Waveform>, Vec<bool>) {
+        let electrodes = self.electrodes.iter().map(|e| match &e.drive {
+            Drive::Voltage(waveform) => (waveform.clone(), false),
+            Drive::Charge(charge) => (Waveform::constant(*charge), true),
+        });
+        let sources = self.sources.iter().map(|s| (s.waveform.clone(), false));
+        electrodes.chain(sources).unzip()
+    }
+
     /// Reads a case file. `sets` are changes from the command line, as `electrode.left.dc=7 V`, applied in order.
     ///
     /// # Errors

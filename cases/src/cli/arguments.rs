@@ -23,6 +23,8 @@ pub(super) enum Verb {
     Mesh(Common),
     /// Charges on the electrodes and their capacitance matrix
     Solve(Common),
+    /// Null points, multipoles, Mathieu's a and q, secular frequencies, depth of the well
+    Analyse(Common),
     /// Potential and field at points
     Probe(ProbeArguments),
     /// Tabulate the potential and measure the table's error
@@ -41,7 +43,11 @@ pub(super) enum Verb {
 impl Verb {
     pub fn common(&self) -> Option<&Common> {
         match self {
-            Self::Check(common) | Self::Mesh(common) | Self::Solve(common) | Self::Table(common) => Some(common),
+            Self::Check(common)
+            | Self::Mesh(common)
+            | Self::Solve(common)
+            | Self::Table(common)
+            | Self::Analyse(common) => Some(common),
             Self::Run(arguments) | Self::Trace(arguments) => Some(&arguments.common),
             Self::Probe(arguments) => Some(&arguments.common),
             Self::Schema | Self::Completions { .. } => None,

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::session::Session;
+use crate::case::Case;
 use crate::output::field_map::{FieldMap, NODES};
 use crate::output::summary::{SolveSummary, Summary, TableSummary};
 use crate::output::{OutputFolder, electrodes, field_map, pictures};
@@ -22,7 +23,7 @@ pub(super) enum Extent {
 pub(super) fn fields(session: &Session, extent: Extent) -> Result<(), Failure> {
     let mut out = session.output()?;
     let ready = ready(&session.case, &session.source, &*session.progress)?;
-    let solution = solved(session, &ready)?;
+    let solution = solved(session, &session.case, &ready)?;
     let planned = match extent {
         Extent::Solution => None,
         Extent::Table => Some(tabulated(session, &solution)?),
@@ -37,15 +38,15 @@ pub(super) fn fields(session: &Session, extent: Extent) -> Result<(), Failure> {
 }
 
 /// Solves, unless the solution was kept, and checks that grains still start outside of the conductors that were solved.
-pub(super) fn solved(session: &Session, ready: &Ready) -> Result<Solution, Failure> {
-    let solution = match session.kept(session.cache.solution(&session.case)) {
+pub(super) fn solved(session: &Session, case: &Case, ready: &Ready) -> Result<Solution, Failure> {
+    let solution = match session.kept(session.cache.solution(case)) {
         Some(solution) => {
             solution.warnings.iter().for_each(|text| session.progress.warning(text));
             solution
         }
-        None => solve(&session.case, &session.source, ready, &*session.progress)?,
+        None => solve(case, &session.source, ready, &*session.progress)?,
     };
-    check_starts_again(&session.case, &session.source, ready, &solution.basis)?;
+    check_starts_again(case, &session.source, ready, &solution.basis)?;
     Ok(solution)
 }
 

@@ -1,5 +1,6 @@
 //! The command line: one file for each verb.
 
+mod analyse;
 mod arguments;
 mod check;
 mod fields;
@@ -42,6 +43,7 @@ fn dispatch(verb: &Verb) -> Result<(), Failure> {
         Verb::Mesh(common) => mesh::mesh(&open(common)?),
         Verb::Solve(common) => fields::fields(&open(common)?, Extent::Solution),
         Verb::Table(common) => fields::fields(&open(common)?, Extent::Table),
+        Verb::Analyse(common) => analyse::analyse(&open(common)?),
         Verb::Probe(arguments) => probe::probe(&open(&arguments.common)?, arguments),
         Verb::Schema => {
             let text = serde_json::to_string_pretty(&schema()).unwrap_or_default();

@@ -62,7 +62,7 @@ pub(super) fn probe(session: &Session, arguments: &ProbeArguments) -> Result<(),
     let points = read_points(&arguments.at)?;
     let mut out = session.output()?;
     let ready = ready(case, source, &*session.progress)?;
-    let solution = solved(session, &ready)?;
+    let solution = solved(session, case, &ready)?;
     let basis = &solution.basis;
     let exact = basis.panel_sum();
     if let Some((line, p)) = points.iter().find(|(_, p)| exact.singular_at(p).is_some()) {

@@ -23,7 +23,7 @@ pub(super) fn run(session: &Session, resume: bool, trace: bool) -> Result<(), Fa
     let mut out = session.output()?;
     let ready = ready(case, source, &*session.progress)?;
     let mut summary = session.summary(if trace { "trace" } else { "run" });
-    let solution = fields::solved(session, &ready)?;
+    let solution = fields::solved(session, case, &ready)?;
     let (plan, tabulated) = fields::tabulated(session, &solution)?;
     let start = Instant::now();
     let driven = fields::write(session, &mut out, &mut summary, &solution, Some(&tabulated))?;
@@ -45,7 +45,7 @@ pub(super) fn run(session: &Session, resume: bool, trace: bool) -> Result<(), Fa
         session.progress.stage("write");
         let start = Instant::now();
         tracks::write(&mut out, &flights, &ready.ensemble)?;
-        pictures::of_flights(&mut out, &session.title(), &flights)?;
+        pictures::of_flights(&mut out, &session.title(), &flights, mesh)?;
         let trace = TraceSummary::new(case, &flights);
         if trace.outcomes.unstable > 0 {
             session.progress.warning(&format!(

@@ -3,6 +3,7 @@
 //! The comments here are what an editor shows beside a key. What a key means, and what may stand in it by itself, is said
 //! here; what keys demand of each other is checked where they are resolved (see [`crate::resolve`]).
 
+pub(crate) mod analysis;
 pub(crate) mod electrode;
 pub(crate) mod grains;
 pub(crate) mod settings;
@@ -49,6 +50,9 @@ pub(crate) struct CaseKeys {
     /// What is written.
     #[serde(default)]
     pub output: settings::OutputKeys,
+    /// What `graintrap analyse` looks at.
+    #[serde(default)]
+    pub analysis: analysis::AnalysisKeys,
     /// Keys to vary: turns the case into a study.
     pub sweep: Option<sweep::SweepTable>,
 }

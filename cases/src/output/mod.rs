@@ -1,5 +1,8 @@
 //! What a run writes: VTK, CSV, plots, the summary.
 
+pub mod analysis_chart;
+pub mod analysis_pictures;
+pub mod analysis_text;
 pub mod electrodes;
 pub mod field_map;
 pub mod folder;

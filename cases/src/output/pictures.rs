@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use field::Samples;
-use meshes::Vec3;
+use meshes::{SurfaceMesh, Vec3};
 use tracer::{Outcome, Region as FlightRegion};
 
 use super::OutputFolder;
@@ -11,7 +11,12 @@ use crate::case::{Case, Region};
 use crate::pipeline::Failure;
 use crate::pipeline::drives::Driven;
 use crate::pipeline::flights::Flights;
-use crate::plots::{Ending, Figure, PlotError, Track, axis_potential, coordinates, phase_planes};
+use crate::plots::{
+    Ending, Figure, PlotError, Track, axis_potential, coordinates, outlines, phase_planes, spectrum, tracks,
+};
+
+/// Samples to an RF period from which on a spectrum is drawn: two show its frequency, and its upper sideband lies above.
+const LEAST_OF_A_PERIOD: f64 = 3.0;
 
 /// Points along the axis: two to a pixel.
 const POINTS: usize = 2000;
@@ -61,12 +66,13 @@ pub fn potential_along_axis(
     write(out, "potential", &axis_potential(title, &axis.name, &curves))
 }
 
-/// Draws the coordinates of the grains against time, and their phase planes.
+/// Draws the tracks of the grains between the electrodes, their coordinates against time, their phase planes, and the spectra of
+/// those that flew to the end, if there are.
 ///
 /// # Errors
 /// The output fails.
-pub fn of_flights(out: &mut OutputFolder, title: &str, flights: &Flights) -> Result<(), Failure> {
-    let tracks: Vec<Track> = flights
+pub fn of_flights(out: &mut OutputFolder, title: &str, flights: &Flights, mesh: &SurfaceMesh) -> Result<(), Failure> {
+    let paths: Vec<Track> = flights
         .samples
         .iter()
         .zip(&flights.traced.endings)
@@ -83,11 +89,22 @@ pub fn of_flights(out: &mut OutputFolder, title: &str, flights: &Flights) -> Res
             },
         })
         .collect();
-    write(out, "coordinates", &coordinates(title, &tracks))?;
-    write(out, "phase_planes", &phase_planes(title, &tracks))
+    write(out, "tracks", &tracks(title, &outlines(mesh), &paths))?;
+    write(out, "coordinates", &coordinates(title, &paths))?;
+    write(out, "phase_planes", &phase_planes(title, &paths))?;
+    // Sampled more rarely, the RF's own lines are folded among the slow ones, and say nothing.
+    let often = flights.period == 0.0 || flights.every * flights.stride as f64 <= flights.period / LEAST_OF_A_PERIOD;
+    match spectrum(title, &paths).filter(|_| often) {
+        Some(figure) => write(out, "spectrum", &figure),
+        None => Ok(()),
+    }
 }
 
-fn write(out: &mut OutputFolder, name: &str, figure: &Figure) -> Result<(), Failure> {
+/// Draws a figure as `name.svg` and `name.png`.
+///
+/// # Errors
+/// The output fails.
+pub fn write(out: &mut OutputFolder, name: &str, figure: &Figure) -> Result<(), Failure> {
     let failed = |error: PlotError| {
         Failure::run(format!("the plot `{name}` cannot be drawn: {error}"), "this is a fault of graintrap")
     };

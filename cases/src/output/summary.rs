@@ -140,6 +140,50 @@ pub struct TraceSummary {
     pub region_min: [f64; 3],
     /// Its upper corner, m.
     pub region_max: [f64; 3],
+    /// How strongly those that still flew at the end were coupled, if they were two or more and charged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plasma: Option<PlasmaSummary>,
+}
+
+/// A cloud of charges in the last tenth of its flight: [`tracer::plasma::Cloud`] as an object.
+#[derive(Clone, Debug, Serialize)]
+pub struct PlasmaSummary {
+    /// Grains in it.
+    pub grains: usize,
+    /// Kinetic temperature of the secular motion, K.
+    pub temperature_kelvin: f64,
+    /// m.
+    pub wigner_seitz_radius: f64,
+    /// Mean distance of nearest neighbours, m.
+    pub nearest_neighbour: f64,
+    /// Coupling with the Wigner-Seitz radius; `null` at rest.
+    pub gamma_wigner_seitz: f64,
+    /// Coupling with the distance of neighbours; `null` at rest.
+    pub gamma_nearest_neighbour: f64,
+    /// Middles of the bins of the radial distribution, m.
+    pub radial_distances: Vec<f64>,
+    /// Pairs in each over those of a uniform ball.
+    pub radial_distribution: Vec<f64>,
+}
+
+impl PlasmaSummary {
+    /// Of flights, if they are many enough.
+    pub fn new(flights: &Flights) -> Option<Self> {
+        let (ensemble, endings) = (&flights.traced.ensemble, &flights.traced.endings);
+        let flying = (0..endings.len()).filter(|&g| matches!(endings[g].outcome, Outcome::TimeUp | Outcome::Stopped));
+        let tracks: Vec<_> =
+            flying.map(|g| (&flights.samples[g][..], ensemble.charges()[g], ensemble.masses()[g])).collect();
+        tracer::plasma::cloud(&tracks, flights.period).map(|cloud| Self {
+            grains: cloud.grains,
+            temperature_kelvin: cloud.temperature,
+            wigner_seitz_radius: cloud.wigner_seitz_radius,
+            nearest_neighbour: cloud.nearest_neighbour,
+            gamma_wigner_seitz: cloud.gamma,
+            gamma_nearest_neighbour: cloud.gamma_of_neighbours,
+            radial_distances: cloud.distances,
+            radial_distribution: cloud.distribution,
+        })
+    }
 }
 
 /// How many flights ended how.
@@ -258,6 +302,7 @@ impl TraceSummary {
             stride: 1,
             region_min: region.min.into(),
             region_max: region.max.into(),
+            plasma: None,
         }
     }
 
@@ -306,6 +351,7 @@ impl TraceSummary {
             stride: flights.stride,
             region_min: flights.region.min.into(),
             region_max: flights.region.max.into(),
+            plasma: PlasmaSummary::new(flights),
         }
     }
 }
@@ -376,6 +422,19 @@ impl Summary {
                 for (grain, end) in trace.finals.iter().flatten().enumerate() {
                     line("", format!("grain {grain}: {}", ending(end)));
                 }
+            }
+            if let Some(p) = &trace.plasma {
+                line(
+                    "coupling",
+                    format!(
+                        "Gamma {:.3e} (Wigner-Seitz radius {}), {:.3e} (neighbours {} apart), secular motion at {:.3e} K",
+                        p.gamma_wigner_seitz,
+                        metres(p.wigner_seitz_radius),
+                        p.gamma_nearest_neighbour,
+                        metres(p.nearest_neighbour),
+                        p.temperature_kelvin
+                    ),
+                );
             }
         }
         let s = &self.seconds;

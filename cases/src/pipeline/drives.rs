@@ -8,7 +8,7 @@ use field::{
 };
 
 use crate::CaseSource;
-use crate::case::{Case, Drive, SourceKind as CaseSourceKind};
+use crate::case::{Case, SourceKind as CaseSourceKind};
 
 use super::Failure;
 
@@ -37,23 +37,18 @@ pub fn sources(case: &Case, source: &CaseSource) -> Result<Vec<Source>, Failure>
         .collect()
 }
 
-/// What each basis function (electrodes, then sources) is given: a voltage, a strength, or a charge for floating electrodes.
-fn given(case: &Case) -> (Vec<Waveform>, Vec<bool>) {
-    let electrodes = case.electrodes.iter().map(|e| match &e.drive {
-        Drive::Voltage(waveform) => (waveform.clone(), false),
-        Drive::Charge(charge) => (Waveform::constant(*charge), true),
-    });
-    let sources = case.sources.iter().map(|s| (s.waveform.clone(), false));
-    electrodes.chain(sources).unzip()
-}
-
 /// The channels of a case: floating electrodes at the voltage that gives them their charge.
 pub fn channels(case: &Case, basis: &ElectrodeBasis) -> Channels {
-    let (waveforms, floating) = given(case);
+    channels_of(case, basis, &case.given().0)
+}
+
+/// The same with other voltages, strengths and charges: see [`Case::given`].
+pub fn channels_of(case: &Case, basis: &ElectrodeBasis, waveforms: &[Waveform]) -> Channels {
+    let (_, floating) = case.given();
     let electrodes = case.electrodes.len();
     let rows = basis.capacitance.floating_voltages(&floating[..electrodes], &basis.induced);
     let combinations: Vec<(usize, Vec<f64>)> = (0..electrodes).filter(|&e| floating[e]).zip(rows).collect();
-    Channels::with_floating(&waveforms, &combinations)
+    Channels::with_floating(waveforms, &combinations)
 }
 
 /// The field of a case, driven.

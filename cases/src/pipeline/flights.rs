@@ -26,6 +26,8 @@ pub struct Flights {
     pub stride: usize,
     /// Time between samples before thinning, s.
     pub every: f64,
+    /// Of the fastest voltage, s; zero where all are constant.
+    pub period: f64,
     /// Where grains were followed.
     pub region: Region,
     /// s.
@@ -296,6 +298,7 @@ pub fn fly(
     reporter.stage("trace");
     let start = Instant::now();
     let every = sampling(case, settings, &field);
+    let period = field.shortest_period().unwrap_or(0.0);
     warn_of_long_flights(settings, &field, &**reporter);
     // A quarter of what is free, and no more than a gigabyte: beyond that files are too large to look at.
     let limit = (memory::available() / 4).min(1 << 30) as usize;
@@ -341,7 +344,7 @@ pub fn fly(
         let help = "look for a charge, a voltage or a mass that is off by many powers of ten";
         return Err(source.error_at(&format!("grains.{group}"), problem, help).into());
     }
-    Ok(Flights { traced, samples, stride, every, region, seconds: start.elapsed().as_secs_f64() })
+    Ok(Flights { traced, samples, stride, every, period, region, seconds: start.elapsed().as_secs_f64() })
 }
 
 fn explained(error: TraceError, source: &CaseSource) -> Failure {

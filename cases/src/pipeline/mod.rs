@@ -4,6 +4,7 @@
 //! touch, grains inside a conductor, work that does not fit in memory) is a [`CaseError`] at the key that causes it, before the
 //! work starts.
 
+pub mod analysis;
 mod axial;
 pub mod choice;
 mod curved;

@@ -233,6 +233,19 @@ fn x_axis(panel: &Panel, width: f64) -> Axis {
     axis
 }
 
+/// Both axes with as many units to a pixel, and the same ticks: the one with room to spare shows more.
+fn equal_scales(mut x: Axis, mut y: Axis, inner: [f64; 2]) -> (Axis, Axis) {
+    let scale = ((x.max - x.min) / inner[0]).max((y.max - y.min) / inner[1]);
+    for (axis, pixels) in [(&mut x, inner[0]), (&mut y, inner[1])] {
+        let (middle, half) = (0.5 * (axis.min + axis.max), 0.5 * scale * pixels);
+        (axis.min, axis.max) = (middle - half, middle + half);
+    }
+    // A tick for every 70 pixels keeps the labels of the horizontal axis apart.
+    x.set_ticks((inner[0] / 70.0) as usize);
+    y.step = x.step;
+    (x, y)
+}
+
 /// Room for the label of the horizontal axis.
 fn x_label_height(panel: &Panel) -> f64 {
     if panel.x_label.is_empty() { 0.0 } else { 1.5 * f64::from(LABEL) }
@@ -250,7 +263,10 @@ fn draw_panel(scene: &mut Scene, panel: &Panel, y: Axis, place: &Place, budget: 
     let Place { origin, cell, left, bottom } = *place;
     let (top, right) = (HEAD, RIGHT);
     let inner = [cell[0] - left - right, cell[1] - top - bottom];
-    let x = x_axis(panel, inner[0]);
+    let (x, y) = match (x_axis(panel, inner[0]), panel.equal) {
+        (x, false) => (x, y),
+        (x, true) => equal_scales(x, y, inner),
+    };
 
     let labels = |axis: Axis| {
         let format = axis.format();

@@ -18,18 +18,26 @@
 
 mod axis;
 mod axis_potential;
+mod contour;
 mod coordinates;
 mod draw;
 mod legend;
 mod phase_planes;
+mod potential_map;
 mod prefix;
+mod spectrum;
 mod thin;
 mod track;
+mod tracks;
 
 pub use axis_potential::axis_potential;
+pub use contour::{Heights, joined};
 pub use coordinates::coordinates;
 pub use phase_planes::phase_planes;
+pub use potential_map::{Map, potential_maps};
+pub use spectrum::spectrum;
 pub use track::{Ending, Track};
+pub use tracks::{outlines, tracks};
 
 #[cfg(test)]
 mod tests;
@@ -125,6 +133,8 @@ pub struct Panel {
     pub marks: Vec<Mark>,
     /// Drawn below the curves.
     pub bands: Vec<Band>,
+    /// As many units to a pixel on both axes: what is round looks round.
+    pub equal: bool,
 }
 
 /// One figure: panels row by row, a title above, a legend below.

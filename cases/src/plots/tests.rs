@@ -238,3 +238,51 @@ fn prefixes_follow_the_largest_value() {
     assert_eq!(unit(0.0, "V", 6), "V");
     assert_eq!(axis_unit([2e-3].into_iter(), "m", 3).factor, 1e3);
 }
+
+#[test]
+fn spectra_name_their_lines_and_their_limits() {
+    // 12.3 turns in 1000 samples of 0.1 ms: 123 Hz.
+    let all = tracks(3, 1000, 12.3);
+    let figure = super::spectrum("spectrum", &all).unwrap();
+    let drawn = drawn(&figure);
+    // Only the first flew to the end; its lines are named above each panel.
+    assert!(
+        drawn.texts.iter().any(|t| t.starts_with("1 grain; entries 10.000 Hz apart; faster than 5000 Hz")),
+        "{:?}",
+        drawn.texts
+    );
+    assert_eq!(drawn.texts.iter().filter(|t| *t == "123.0 Hz").count(), 3, "{:?}", drawn.texts);
+    assert!(super::spectrum("none flew to the end", &all[1..]).is_none());
+    assert!(super::spectrum("short", &tracks(1, 50, 2.0)).is_none());
+    assert!(super::spectrum("empty", &[]).is_none());
+    let rest = Track { positions: vec![[0.0, 1.0, 2.0]; 1000], ..all[0].clone() };
+    assert!(says(&super::spectrum("rest", &[rest]).unwrap(), "at rest"));
+}
+
+#[test]
+fn tracks_in_space_have_equal_scales() {
+    use meshes::{Placement, Shape as Electrode, SurfaceMesh, triangulate_to};
+    let ball = triangulate_to(&Electrode::Sphere { radius: 2e-3 }, 2000).unwrap().0;
+    let mesh = SurfaceMesh::assemble([("ball".to_owned(), ball.placed(&Placement::default()).unwrap())]);
+    let edges = super::outlines(&mesh);
+    let figure = super::tracks("ball", &edges, &tracks(2, 300, 4.0));
+    let drawn = drawn(&figure);
+    // The outline of a sphere is a circle wherever one looks from: as wide as it is high, to a facet's width.
+    let outline = drawn.lines.iter().max_by(|a, b| extent(a, 0).total_cmp(&extent(b, 0))).unwrap();
+    assert!((extent(outline, 0) / extent(outline, 1) - 1.0).abs() < 0.05, "{outline:?}");
+    for text in ["grain 0", "grain 1", "electrodes", "x direction", "time up", "struck"] {
+        assert!(drawn.texts.iter().any(|t| t == text), "{text}");
+    }
+    // Grains that left for far away do not make the trap a dot.
+    let mut far = tracks(1, 300, 4.0);
+    far[0].positions[299] = [10.0, 0.0, 0.0];
+    let small = self::drawn(&super::tracks("far", &edges, &far));
+    let widest = small.lines.iter().map(|line| extent(line, 0)).fold(0.0, f64::max);
+    assert!(widest > 100.0, "{widest} pixels");
+    assert!(says(&super::tracks("nothing", &[], &[]), "no grains, seen from azimuth -60°, elevation 22°"));
+}
+
+fn extent(line: &[[f64; 2]], k: usize) -> f64 {
+    let of = |f: fn(f64, f64) -> f64, from: f64| line.iter().map(|p| p[k]).fold(from, f);
+    of(f64::max, f64::NEG_INFINITY) - of(f64::min, f64::INFINITY)
+}

@@ -54,6 +54,7 @@ measures!(
     Velocity,
     Acceleration,
     Force,
+    ElectricField,
     MagneticField,
     Pressure,
     Density,

@@ -1,6 +1,8 @@
 //! From the keys of a case file to a [`Case`]: defaults filled in, and every rule checked that ties keys together.
 
+mod analysis;
 mod at;
+mod chart;
 mod electrodes;
 mod files;
 mod grains;
@@ -23,6 +25,11 @@ use waveforms::Drives;
 
 /// Reads the tree and checks it.
 pub(crate) fn case(source: &CaseSource) -> Result<Case, CaseError> {
+    resolved(source, true)
+}
+
+/// The corners of a chart are cases, which have none.
+fn resolved(source: &CaseSource, with_chart: bool) -> Result<Case, CaseError> {
     let keys: CaseKeys = read(&source.tree).map_err(|fault| explain(source, fault))?;
     let root = At::root(source);
     if keys.electrode.is_empty() && keys.source.is_empty() {
@@ -42,7 +49,8 @@ pub(crate) fn case(source: &CaseSource) -> Result<Case, CaseError> {
     if field.ground.is_some() {
         names::not_ground(&root, &electrodes, &sources)?;
     }
-    Ok(Case {
+    let analysis = analysis::analysis(&root.key("analysis"), &keys.analysis, &electrodes)?;
+    let mut case = Case {
         title: keys.title.unwrap_or_default(),
         electrodes,
         sources,
@@ -52,6 +60,11 @@ pub(crate) fn case(source: &CaseSource) -> Result<Case, CaseError> {
         forces,
         trace,
         output: settings::output(&keys.output),
+        analysis,
         sweep: keys.sweep.map(|keys| sweep::sweep(&root.key("sweep"), keys)).transpose()?,
-    })
+    };
+    if let Some(keys) = keys.analysis.chart.as_ref().filter(|_| with_chart) {
+        case.analysis.chart = Some(chart::chart(&root.key("analysis").key("chart"), keys, &case)?);
+    }
+    Ok(case)
 }

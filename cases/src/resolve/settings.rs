@@ -49,12 +49,7 @@ fn ground(at: &At, keys: &GroundKeys) -> Result<Plane, CaseError> {
 }
 
 pub(super) fn table(at: &At, keys: &TableKeys, field: &FieldSettings) -> Result<TableSettings, CaseError> {
-    let region = match (&keys.min, &keys.max) {
-        (Some(min), Some(max)) => Some(region(at, min, max)?),
-        (None, None) => None,
-        (Some(_), None) => return Err(one_corner(at, "max", "min")),
-        (None, Some(_)) => return Err(one_corner(at, "min", "max")),
-    };
+    let region = corners(at, keys.min.as_ref(), keys.max.as_ref())?;
     if let (Some(spacing), Some(region)) = (keys.spacing, &region)
         && spacing.value > (region.max - region.min).min()
     {
@@ -67,6 +62,20 @@ pub(super) fn table(at: &At, keys: &TableKeys, field: &FieldSettings) -> Result<
         // A fraction of a byte means nothing.
         max_memory: keys.max_memory.map(|bytes| bytes.value.ceil() as u64),
     })
+}
+
+/// A box of which both corners are given, or none.
+pub(super) fn corners(
+    at: &At,
+    min: Option<&Vector<crate::quantity::kinds::Length>>,
+    max: Option<&Vector<crate::quantity::kinds::Length>>,
+) -> Result<Option<Region>, CaseError> {
+    match (min, max) {
+        (Some(min), Some(max)) => Ok(Some(region(at, min, max)?)),
+        (None, None) => Ok(None),
+        (Some(_), None) => Err(one_corner(at, "max", "min")),
+        (None, Some(_)) => Err(one_corner(at, "min", "max")),
+    }
 }
 
 fn one_corner(at: &At, missing: &str, given: &str) -> CaseError {

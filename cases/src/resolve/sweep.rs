@@ -71,7 +71,7 @@ fn spread(at: &At, keys: &SpreadKeys) -> Result<Vec<String>, CaseError> {
 }
 
 /// Number and unit of an end.
-fn end(at: &At, end: &End) -> Result<(f64, String), CaseError> {
+pub(super) fn end(at: &At, end: &End) -> Result<(f64, String), CaseError> {
     match end {
         End::Number(number) => Ok((number.value, String::new())),
         End::String(text) => {

@@ -130,7 +130,7 @@ fn cli_output_folders_that_cannot_be() {
     }
     let points = folder("run").join("points.csv");
     for out in folders {
-        for verb in ["run", "solve", "table", "trace", "mesh", "probe"] {
+        for verb in ["run", "solve", "table", "trace", "mesh", "probe", "analyse"] {
             let tiny = tiny();
             let mut args = vec![verb, &tiny, "--json", "-o", &out];
             if verb == "probe" {

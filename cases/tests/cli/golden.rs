@@ -49,7 +49,32 @@ fn golden_cases_are_all_here() {
         .map(|entry| entry.file_name().to_str().unwrap().to_owned())
         .collect();
     names.sort();
-    assert_eq!(names, ["grid_plate", "paul_trap", "ring_and_end_caps", "ring_and_plate", "sphere", "two_rings"]);
+    let here = ["grid_plate", "paul_trap", "ring_and_end_caps", "ring_and_plate", "sphere", "two_rings"];
+    // What these give is held by tests/experiments.
+    let experiments = [
+        "annulus_end_caps",
+        "annulus_plates",
+        "cloud_plates",
+        "crystal_ball",
+        "crystal_chain",
+        "dust_in_air",
+        "mass_filter",
+        "mathieu",
+        "mathieu_corner",
+        "penning",
+        "penning_drag",
+        "planar_toy",
+        "plasma_cold",
+        "plasma_hot",
+        "ring_and_plate_no_null",
+        "two_rings_held",
+        "two_rings_lost",
+        "two_rings_narrow",
+        "two_rings_wide",
+    ];
+    let mut all = [&here[..], &experiments[..]].concat();
+    all.sort_unstable();
+    assert_eq!(names, all);
     for name in names {
         graintrap(&["check", &case(&name), "--quiet"]).done();
     }

@@ -5,6 +5,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod analyse;
 mod bad_run;
 mod golden;
 mod ground;
