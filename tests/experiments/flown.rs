@@ -47,7 +47,7 @@ pub fn flown(name: &str, sets: &[&str]) -> Flown {
         let reporter: Arc<dyn Reporter> = Arc::new(Silent);
         let ready = ready(&case, &source, &Silent)?;
         let solution = solve(&case, &source, &ready, &Silent)?;
-        let plan = Plan::new(&case, &source, &solution.basis)?;
+        let plan = Plan::new(&case, &solution.basis);
         let tabulated = table(&case, &source, &solution.basis, &plan, &Silent)?;
         let driven = tabulated_field(&case, &solution.basis, &tabulated.table);
         let mesh = &solution.basis.mesh;
