@@ -1,8 +1,11 @@
 //! The table against the exact panel sum.
 
-use field::{BasisField, BoundaryProblem, CELLS_PER_BRICK, Samples, TableOptions, TabulatedField, tabulate};
+use field::{
+    BasisField, BoundaryProblem, CELLS_PER_BRICK, ElectrodeBasis, PotentialTable, Samples, TableOptions,
+    TabulatedField, tabulate,
+};
 use graintrap_tests::{at, random, several};
-use meshes::{Placement, Shape, SurfaceMesh, Vec3};
+use meshes::{GridPattern, Outline, Placement, Shape, SurfaceMesh, Vec3, Weave};
 
 struct Geometry {
     name: &'static str,
@@ -88,4 +91,58 @@ fn exact_table_outside_and_next_to_conductors() {
     exact.sample(&points, &mut b);
     assert_eq!(a, b, "what the table does not cover is exact to the bit");
     assert_eq!((a.potential[2], a.gradient[2]), (2.0, Vec3::zeros()), "inside the sphere");
+}
+
+/// Largest error of the field of a table with all basis functions driven, relative to the strongest at these points.
+fn field_error(basis: &ElectrodeBasis, table: &PotentialTable, points: &[Vec3]) -> f64 {
+    let volts: Vec<f64> = (0..basis.functions()).map(|k| 1.0 - 0.7 * k as f64).collect();
+    let (mut truth, mut got) = (Samples::default(), Samples::default());
+    basis.combined(std::slice::from_ref(&volts)).sample(points, &mut truth);
+    TabulatedField::combined(basis, table, &[volts]).sample(points, &mut got);
+    let strongest = truth.gradient.iter().map(|g| g.norm()).fold(0.0, f64::max);
+    let apart = truth.gradient.iter().zip(&got.gradient).map(|(a, b)| (a - b).norm());
+    apart.fold(0.0, f64::max) / strongest
+}
+
+#[test]
+fn exact_table_of_a_grid_plate_has_small_cells_where_they_count() {
+    // Wires 0.2 apart between two plates 1.2 apart: the field varies on the scale of the wires beside them, on that of the gaps
+    // elsewhere.
+    let outline = Outline::Rectangle([1.0, 1.0]);
+    let wires = GridPattern::Wires { weave: Weave::Parallel, wire_radius: 0.02 };
+    let grid = Shape::GridPlate { outline, pitch: 0.2, pattern: wires };
+    let plate = Shape::Plate { size: [1.0, 1.0], thickness: 0.0 };
+    let mesh = several(&[
+        (plate.clone(), at(-0.6 * Vec3::z()), 200),
+        (grid, at(Vec3::zeros()), 600),
+        (plate, at(0.6 * Vec3::z()), 200),
+    ]);
+    let basis = BoundaryProblem::new(&mesh).solve().unwrap();
+    let (min, max) = (Vec3::new(-0.4, -0.4, -0.5), Vec3::new(0.4, 0.4, 0.5));
+    let options = TableOptions { min, max, accuracy: 1e-3, spacing: None, max_bytes: 1 << 29 };
+    let (small, report) = tabulate(&basis, &options, &|_| ()).unwrap();
+    // A table of cells of one size with no fewer nodes, held to nothing: its layer is as thin as can be.
+    let mut spacing = 0.1;
+    while PotentialTable::bricks_for(min, max, spacing).nodes() < report.nodes {
+        spacing *= 0.97;
+    }
+    let options = TableOptions { accuracy: 0.5, spacing: Some(spacing), ..options };
+    let (uniform, other) = tabulate(&basis, &options, &|_| ()).unwrap();
+    // Everywhere outside of the wires: what a table leaves to the exact sum is no error, but it is the dear part of the space.
+    let mut next = random(11);
+    let mut any = std::iter::repeat_with(|| Vec3::from_fn(|k, _| min[k] + next() * (max[k] - min[k])));
+    let exact = basis.panel_sum();
+    let free: Vec<Vec3> = any.by_ref().filter(|p| exact.inside(p).is_none()).take(20_000).collect();
+    let left = |table: &PotentialTable| free.iter().filter(|p| !table.covers(p)).count();
+    let both: Vec<Vec3> = free.iter().filter(|p| small.covers(p) && uniform.covers(p)).take(3000).copied().collect();
+    let (a, b) = (field_error(&basis, &small, &both), field_error(&basis, &uniform, &both));
+    println!("bricks {report:?}\nuniform {other:?}");
+    println!(
+        "fields off by {a:.1e} and {b:.1e}; left to the exact sum {} and {} of 20000",
+        left(&small),
+        left(&uniform)
+    );
+    assert!(report.error() <= 1e-3 && a < 1e-3, "{a:e}, {report:?}");
+    assert!(report.finest_spacing < 0.3 * report.spacing && report.jump < 1e-12, "{report:?}");
+    assert!(left(&uniform) > left(&small), "{} {}", left(&small), left(&uniform));
 }

@@ -78,7 +78,8 @@ pub(crate) struct TableKeys {
     pub max: Option<Vector<Length>>,
     /// Wanted relative error of the tabulated field; left out: that of `field.accuracy`.
     pub accuracy: Option<Fraction>,
-    /// Distance of its nodes; left out: chosen from the accuracy.
+    /// Size of its cells, the same everywhere, a quarter of the distance of its nodes; left out: chosen from the accuracy, smaller
+    /// where the field needs it.
     pub spacing: Option<Positive<Length>>,
     /// No more memory than this; left out: chosen from what the machine has.
     pub max_memory: Option<Positive<Memory>>,

@@ -65,7 +65,8 @@ pub fn joined(pieces: &[[[f64; 2]; 2]]) -> Vec<[f64; 2]> {
             ends.entry(key(end)).or_default().push(n);
         }
     }
-    let mut used = vec![false; pieces.len()];
+    // Where a line goes through a node of the grid, pieces of no length stand that nothing needs.
+    let mut used: Vec<bool> = pieces.iter().map(|[a, b]| key(a) == key(b)).collect();
     let mut line = Vec::new();
     let next = |from: &[f64; 2], used: &[bool]| ends.get(&key(from))?.iter().copied().find(|n| !used[*n]);
     for start in 0..pieces.len() {

@@ -157,8 +157,8 @@ impl Kernel {
             return None;
         }
         let mut found = Found { slot: next & !WHOLE, ..Found::default() };
-        for k in 0..3 {
-            let cells = CELLS as f64 * at[k];
+        for (k, at) in at.into_iter().enumerate() {
+            let cells = CELLS as f64 * at;
             let cell = (cells as i32).min(CELLS as i32 - 1);
             found.cell[k] = cell as u8;
             found.part[k] = cells - f64::from(cell);
