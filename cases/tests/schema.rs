@@ -39,6 +39,7 @@ fn schema_accepts_what_the_reader_accepts() {
 
 /// What only the reader can refuse: rules between keys, units, other files, and numbers that JSON has no words for.
 const BEYOND_A_SCHEMA: &str = "\
+    analysis_chart_backwards analysis_chart_no_grains analysis_chart_q_alone analysis_chart_radius analysis_chart_unknown_electrode \
     analysis_order analysis_multipole_m analysis_wish_of_nothing analysis_wish_electrode analysis_wish_in_volts amplitude_in_coulombs axis_without_direction disc_hole_too_large drive_circle drive_is_a_voltage drive_phase_of_ramp \
     drive_unknown drive_unknown_in_table field_too_many_panels \
     grains_box_inside_out grains_count_missing grains_count_of_points grains_density_of_points \
