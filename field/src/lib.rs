@@ -86,6 +86,7 @@ pub mod source;
 mod symmetry;
 pub mod table;
 pub mod waveform;
+pub mod zonal;
 
 pub use basis_field::{BasisField, Samples};
 pub use boundary_problem::{BoundaryProblem, By, SolveError, SolveReport};
@@ -106,3 +107,4 @@ pub use table::{
     tabulate_around, tabulate_from,
 };
 pub use waveform::{Waveform, WaveformPart};
+pub use zonal::{Zonal, zonal};

@@ -10,10 +10,13 @@ use std::path::Path;
 use serde::Serialize;
 
 pub use crate::keys::settings::{Gas, Integrator, Method, Reflection, Solver};
+pub use crate::keys::study::StudyKind;
+pub use crate::keys::sweep::Sampling;
 pub use electrode::{Drive, Electrode, ElectrodeShape, ImportedMesh, MeshFormat, Source, SourceKind};
 pub use parts::CaseParts;
 pub use settings::{
-    Drag, FieldSettings, Forces, GROUND, GrainGroup, Output, Region, Sweep, SweepAxis, TableSettings, TraceSettings,
+    Drag, FieldSettings, Forces, GROUND, GrainGroup, Output, Region, Study, Sweep, SweepAxis, TableSettings,
+    TraceSettings,
 };
 
 use crate::case_source::CaseSource;
@@ -45,6 +48,8 @@ pub struct Case {
     pub output: Output,
     /// What a study varies.
     pub sweep: Option<Sweep>,
+    /// What a study looks at.
+    pub study: Study,
 }
 
 impl Case {

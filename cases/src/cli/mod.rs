@@ -9,6 +9,7 @@ mod probe;
 mod progress;
 mod run;
 mod session;
+mod study;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -43,6 +44,7 @@ fn dispatch(verb: &Verb) -> Result<(), Failure> {
         Verb::Solve(common) => fields::fields(&open(common)?, Extent::Solution),
         Verb::Table(common) => fields::fields(&open(common)?, Extent::Table),
         Verb::Probe(arguments) => probe::probe(&open(&arguments.common)?, arguments),
+        Verb::Study(arguments) => study::study(open(&arguments.common)?, arguments),
         Verb::Schema => {
             let text = serde_json::to_string_pretty(&schema()).unwrap_or_default();
             print(&format!("{text}\n"));

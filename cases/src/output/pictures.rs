@@ -100,7 +100,11 @@ pub fn of_flights(out: &mut OutputFolder, title: &str, flights: &Flights, mesh: 
     }
 }
 
-fn write(out: &mut OutputFolder, name: &str, figure: &Figure) -> Result<(), Failure> {
+/// Writes a figure as SVG and PNG.
+///
+/// # Errors
+/// It cannot be drawn, or the output fails.
+pub fn write(out: &mut OutputFolder, name: &str, figure: &Figure) -> Result<(), Failure> {
     let failed = |error: PlotError| {
         Failure::run(format!("the plot `{name}` cannot be drawn: {error}"), "this is a fault of graintrap")
     };

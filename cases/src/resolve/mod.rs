@@ -8,6 +8,7 @@ mod names;
 mod settings;
 mod shapes;
 mod sources;
+mod study;
 mod sweep;
 mod waveforms;
 
@@ -53,5 +54,6 @@ pub(crate) fn case(source: &CaseSource) -> Result<Case, CaseError> {
         trace,
         output: settings::output(&keys.output),
         sweep: keys.sweep.map(|keys| sweep::sweep(&root.key("sweep"), keys)).transpose()?,
+        study: study::study(&root.key("study"), &keys.study)?,
     })
 }

@@ -14,3 +14,4 @@ mod odd;
 mod resume;
 mod same;
 mod stopped;
+mod study;
