@@ -107,12 +107,14 @@ mod tests {
         let expected = legendre(axis.dot(&d) / d.norm());
         for l in 0..=HIGHEST {
             let exact = expected[l] / d.norm().powi(l as i32 + 1);
-            // Aliasing of degree 32 - l, 2^-24 for the highest, against r^-l.
-            let scale = d.norm().powi(-(l as i32) - 1);
-            assert!((zonal.coefficients[0][l] - exact).abs() < 1e-6 * scale, "{l}");
+            // The first degree that the rule takes for l is 32 - l, where the potential on the sphere of half the distance has
+            // fallen to 2^(l - 32) of 1/d; A_l takes (2l + 1)/r^l of that, and of the next degrees together as much again.
+            let alias = 2.0 * (2 * l + 1) as f64 * 2.0_f64.powi(l as i32 - 32) / d.norm();
+            let scale = (0.5 * d.norm()).powi(-(l as i32));
+            assert!((zonal.coefficients[0][l] - exact).abs() < alias * scale, "{l}");
         }
         // Where the sphere comes nearest, 1/(d/2)², at a point of the rule near by.
         let nearest = 4.0 / d.norm_squared();
-        assert!(zonal.strongest[0] <= nearest && zonal.strongest[0] > 0.9 * nearest);
+        assert!(zonal.strongest[0] <= nearest && zonal.strongest[0] > 0.8 * nearest);
     }
 }

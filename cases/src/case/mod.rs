@@ -16,7 +16,7 @@ pub use electrode::{Drive, Electrode, ElectrodeShape, ImportedMesh, MeshFormat, 
 pub use parts::CaseParts;
 pub use settings::{
     Drag, FieldSettings, Forces, GROUND, GrainGroup, Output, Region, Study, Sweep, SweepAxis, TableSettings,
-    TraceSettings,
+    TraceSettings, Weighing,
 };
 
 use crate::case_source::CaseSource;

@@ -218,4 +218,24 @@ pub struct Study {
     pub axis: Vec3,
     /// On which sphere, m; `None`: half the way to the nearest conductor.
     pub radius: Option<f64>,
+    /// Angles from the normal at which light falls on grids, rad; below a right angle.
+    pub angles: Vec<f64>,
+    /// Half angle of a cone from which it falls, rad.
+    pub cone: Option<f64>,
+    /// How many rays each transparency is told from.
+    pub rays: usize,
+    /// What a study of grids weighs. Rows do not depend on it.
+    #[serde(skip)]
+    pub weighing: Weighing,
+}
+
+/// What makes a grid the best: the least of `weight` (1 - T) + deviation / `tolerated`, T the transparency.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weighing {
+    /// Of light that is lost.
+    pub weight: f64,
+    /// Deviation of the field that is tolerated, against the strongest.
+    pub tolerated: f64,
+    /// The narrowest wire, or bar between holes, that can be made, m.
+    pub smallest_wire: f64,
 }

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::time::Instant;
 
 use serde_json::json;
@@ -9,12 +10,13 @@ use serde_json::json;
 use super::arguments::StudyArguments;
 use super::session::Session;
 use crate::cache::Cache;
-use crate::case::Sweep;
+use crate::case::{StudyKind, Sweep};
 use crate::output::OutputFolder;
 use crate::output::pictures;
 use crate::pipeline::{Failure, Reporter, memory};
 use crate::study::figures::figure;
 use crate::study::files::{CSV, JSON, PARQUET, Table, unknown_report};
+use crate::study::front::Front;
 use crate::study::journal::{JOURNAL, Journal, kept, name};
 use crate::study::points::{Point, Refused, points};
 use crate::study::row::{End, Row};
@@ -58,6 +60,7 @@ pub(super) fn study(mut session: Session, arguments: &StudyArguments) -> Result<
         cache: &session.cache,
         journal: &journal,
         reporter: &*session.progress,
+        solids: Mutex::default(),
     };
     let (rows, tally) = work.rows(&mut out, all, refused, &before)?;
     finish(&session, out, &sweep, &rows, tally, shard, start)
@@ -155,6 +158,13 @@ fn finish(
     if let Some(figure) = figure(&session.title(), sweep, rows) {
         pictures::write(&mut out, "study", &figure)?;
     }
+    let front = match session.case.study.kind {
+        StudyKind::GridTransparency => Front::of(rows, &session.case.study.weighing),
+        StudyKind::Sweep => None,
+    };
+    if let Some(front) = &front {
+        pictures::write(&mut out, "front", &front.figure(&session.title(), sweep, rows))?;
+    }
     let failed: Vec<&Row> = rows.iter().filter(|row| row.reason().is_some()).collect();
     if let Some(first) = failed.first() {
         let reason = first.reason().unwrap_or_default();
@@ -184,12 +194,19 @@ fn finish(
         "warnings": session.progress.warnings(),
         "files": files,
     });
+    if let Some(front) = &front {
+        object["front"] = front.json(rows);
+    }
     if rows.len() <= LISTED {
         object["rows"] = table.json().into();
     }
     out.write(JSON, |w| serde_json::to_writer_pretty(w, &object))?;
     out.commit()?;
-    session.say(&object, || text(session, rows, &failed, tally, start, &files, &session.folder));
+    let sentence = front.map(|front| front.sentence(sweep, rows));
+    session.say(&object, || {
+        let read = sentence.map(|sentence| format!("grids        {sentence}\n")).unwrap_or_default();
+        text(session, rows, &failed, tally, start, &files, &session.folder) + &read
+    });
     if !rows.is_empty() && failed.len() == rows.len() {
         let reason = failed[0].reason().unwrap_or_default();
         return Err(Failure::run(format!("every point failed: {reason}"), format!("the reasons are in {CSV}")));

@@ -11,6 +11,8 @@
 
 pub mod figures;
 pub mod files;
+pub mod front;
+pub mod grid;
 pub mod journal;
 pub mod numbers;
 pub mod points;

@@ -111,7 +111,7 @@ fn told(what: &str, of: &Zonal, weights: &[f64], error: f64, radius: f64) -> Vec
 }
 
 /// The amplitude of each channel at the first frequency there is: what goes with cos ωt, or, where nothing does, with -sin ωt.
-fn amplitudes(waveforms: &[Waveform]) -> Option<Vec<f64>> {
+pub fn amplitudes(waveforms: &[Waveform]) -> Option<Vec<f64>> {
     let sines = |waveform: &Waveform| -> Vec<(f64, f64, f64)> {
         let sine = |part: &WaveformPart| match *part {
             WaveformPart::Sine { amplitude, frequency, phase } => Some((amplitude, frequency, phase)),

@@ -6,13 +6,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
 
+use super::grid;
 use super::journal::{Journal, usable};
 use super::numbers;
 use super::points::{Point, Refused, case_at};
 use super::row::{End, Number, Row};
 use crate::CaseSource;
-use crate::cache::{Cache, Digest, table_key};
-use crate::case::Case;
+use crate::cache::{Cache, Digest, solution_key, table_key};
+use crate::case::{Case, StudyKind};
 use crate::output::OutputFolder;
 use crate::pipeline::flights::{Flights, fly, induction, obstacles};
 use crate::pipeline::ready::{Ready, check_starts_again, flight_region, ready};
@@ -66,6 +67,8 @@ pub struct Work<'a> {
     pub journal: &'a Journal,
     /// Who is told how far the work is.
     pub reporter: &'a dyn Reporter,
+    /// What was solved with plates in place of grids.
+    pub solids: Mutex<HashMap<Digest, Arc<Solution>>>,
 }
 
 /// A point whose case stands ready to fly.
@@ -159,6 +162,15 @@ impl Work<'_> {
                 }
             }
             let Some(Ok(solution)) = &solved else { continue };
+            let compared = match flying.first().map(|first| self.solid(first, tally)).transpose() {
+                Ok(compared) => compared.flatten(),
+                Err(failure) => {
+                    for standing in flying {
+                        rows.push(self.failed(standing.point, &failure, done)?);
+                    }
+                    continue;
+                }
+            };
             if shared
                 && !solution.kept
                 && let Some(first) = flying.first()
@@ -203,7 +215,7 @@ impl Work<'_> {
                     .with_max_len(1)
                     .map(|standing| {
                         let key = standing.point.key;
-                        let row = row(standing, solution, tabulated);
+                        let row = row(standing, solution, compared.as_deref(), tabulated);
                         self.journal.add(&key, &row)?;
                         done();
                         Ok(row)
@@ -251,6 +263,24 @@ impl Work<'_> {
         solve(&first.case, &first.source, &first.ready, &Quiet::default())
     }
 
+    /// The same trap with plates in place of its grids, where the study is one of grids.
+    fn solid(&self, first: &Standing, tally: &mut Tally) -> Result<Option<Arc<Solution>>, Failure> {
+        if first.case.study.kind != StudyKind::GridTransparency {
+            return Ok(None);
+        }
+        let case = grid::with_plates(&first.case, &first.source)?;
+        let key = solution_key(&case);
+        let mut solids = self.solids.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(solid) = solids.get(&key) {
+            return Ok(Some(Arc::clone(solid)));
+        }
+        tally.solved += 1;
+        let ready = ready(&case, &first.source, &Quiet::default())?;
+        let solid = Arc::new(solve(&case, &first.source, &ready, &Quiet::default())?);
+        solids.insert(key, Arc::clone(&solid));
+        Ok(Some(solid))
+    }
+
     fn table(
         &self,
         out: &mut OutputFolder,
@@ -290,9 +320,9 @@ fn planned(standing: Standing, solution: &Solution) -> Result<Standing, (Point, 
 }
 
 /// Flies the grains of a point, if it has any, and reports.
-fn row(standing: Standing, solution: &Solution, tabulated: Option<&Tabulated>) -> Row {
+fn row(standing: Standing, solution: &Solution, solid: Option<&Solution>, tabulated: Option<&Tabulated>) -> Row {
     let quiet: Arc<Quiet> = Arc::default();
-    let worked = worked(&standing, solution, tabulated, &quiet);
+    let worked = worked(&standing, solution, solid, tabulated, &quiet);
     let mut warnings = solution.warnings.clone();
     warnings.extend(standing.warnings);
     warnings.extend(quiet.said());
@@ -306,16 +336,23 @@ fn row(standing: Standing, solution: &Solution, tabulated: Option<&Tabulated>) -
 fn worked(
     standing: &Standing,
     solution: &Solution,
+    solid: Option<&Solution>,
     tabulated: Option<&Tabulated>,
     quiet: &Arc<Quiet>,
 ) -> Result<Vec<Number>, Failure> {
     let case = &standing.case;
     let mut numbers = numbers::of_field(case, solution);
+    if let Some(solid) = solid {
+        numbers.extend(grid::of_grid(case, &standing.source, solution, solid)?);
+    }
     if let Some(tabulated) = tabulated {
         tabulated.warn_if_missed(case, &**quiet);
         numbers.extend(numbers::of_table(tabulated));
         if let Some(flights) = flights(standing, solution, tabulated, quiet)? {
             numbers.extend(numbers::of_flights(case, &flights));
+            if solid.is_some() {
+                numbers.extend(grid::of_grains(case, &standing.ready.ensemble, &flights));
+            }
         }
     }
     Ok(numbers)

@@ -189,3 +189,97 @@ fn cli_study_refuses_what_cannot_be() {
     let said = graintrap(&["study", &case, "--shard", "3/2"]);
     assert!(said.status == Some(2) && said.err.contains("i from 1 to n"), "{}", said.err);
 }
+
+#[test]
+fn cli_study_finds_the_penetration_length_and_the_shadow_of_a_grid() {
+    let scratch = Scratch::new();
+    // A grid of 9 x 9 holes half way between two plates, with grains that feel nothing falling straight onto its middle.
+    let text = r#"
+[[electrode]]
+name  = "grid"
+shape = "grid_plate"
+size  = [9, 9]
+pitch = 1
+hole  = "square"
+open  = 0.8
+
+[[electrode]]
+name   = "top"
+shape  = "plate"
+size   = [9, 9]
+center = [0, 0, 2]
+dc     = 1
+
+[[electrode]]
+name   = "bottom"
+shape  = "plate"
+size   = [9, 9]
+center = [0, 0, -2]
+
+[field]
+accuracy = 5e-3
+
+[table]
+min      = [-2.5, -2.5, -1]
+max      = [2.5, 2.5, 1]
+spacing  = 0.5
+accuracy = 0.5
+
+[[grains]]
+count  = 1000
+mass   = "1 kg"
+charge = "1e-30 C"
+place  = { kind = "box", min = [-2.5, -2.5, 0.5], max = [2.5, 2.5, 0.6] }
+speed  = { kind = "uniform", velocity = [0, 0, -1] }
+
+[trace]
+duration = 1.5
+
+[study]
+kind   = "grid_transparency"
+center = [0, 0, 1]
+radius = 0.5
+angles = ["0 deg", "45 deg"]
+cone   = "20 deg"
+
+[sweep]
+sampling = "zip"
+"electrode.grid.hole" = ["square", "round"]
+"electrode.grid.open" = [0.8, 0.6]
+"#;
+    let case = scratch.file("sandwich.toml", text);
+    let json = study(&case, &scratch.at("out"), &[]).done().json();
+    let rows = json["rows"].as_array().unwrap();
+    // tests/reference/grid_plate.json: square_mesh_flat.b=0.2 and hole_array.a=0.3, for endless plates.
+    for (row, (delta, open)) in
+        rows.iter().zip([(0.074_857_631_1, 0.64), (0.019_097_969_99, std::f64::consts::PI * 0.09)])
+    {
+        let (got, error) = (number(row, "delta"), number(row, "delta_error"));
+        println!("delta {got:.6} of {delta:.6}, error told {error:.1e}");
+        assert!((got / delta - 1.0).abs() < 1e-2, "delta {got} instead of {delta}");
+        assert!((number(row, "open_fraction") - open).abs() < 1e-12);
+        // Sheets: as open from everywhere, as rays tell it, some 1/√N of a fifth of the cell.
+        for name in ["light.0deg", "light.45deg", "light.cone"] {
+            assert!((number(row, name) - open).abs() < 5e-3, "{name} of {row}");
+        }
+        // Grains that feel nothing see what light sees: within the interval of 95 %, a little widened, of 1000 of them.
+        let passed = number(row, "grains_passed");
+        assert!((passed - open).abs() < 1.5 * number(row, "grains_passed_error"), "{passed} of {open} passed");
+        assert!((passed + number(row, "grains_caught") - 1.0).abs() < 1e-12, "none turns back");
+        assert!(number(row, "grains_passed_low") < passed && passed < number(row, "grains_passed_high"));
+    }
+    // Smaller holes, darker and nearer to the plate: both are on the front.
+    assert!(number(&rows[0], "field_deviation_max") > number(&rows[1], "field_deviation_max"));
+    assert_eq!(json["front"]["front"], serde_json::json!([2, 1]));
+    assert!(Path::new(&scratch.at("out")).join("front.png").is_file());
+    // A case without a grid.
+    let said = graintrap(&[
+        "study",
+        &swept(&scratch, FLOWN),
+        "--set",
+        "study.kind=grid_transparency",
+        "-o",
+        &scratch.at("no"),
+    ]);
+    assert!(said.err.contains("study.kind: the case has no grid to study"), "{}", said.err);
+}
