@@ -226,7 +226,7 @@ spacing  = 0.5
 accuracy = 0.5
 
 [[grains]]
-count  = 1000
+count  = 100
 mass   = "1 kg"
 charge = "1e-30 C"
 place  = { kind = "box", min = [-2.5, -2.5, 0.5], max = [2.5, 2.5, 0.6] }
@@ -262,7 +262,7 @@ sampling = "zip"
         for name in ["light.0deg", "light.45deg", "light.cone"] {
             assert!((number(row, name) - open).abs() < 5e-3, "{name} of {row}");
         }
-        // Grains that feel nothing see what light sees: within the interval of 95 %, a little widened, of 1000 of them.
+        // Grains that feel nothing see what light sees: within the interval of 95 %, a little widened, of 100 of them.
         let passed = number(row, "grains_passed");
         assert!((passed - open).abs() < 1.5 * number(row, "grains_passed_error"), "{passed} of {open} passed");
         assert!((passed + number(row, "grains_caught") - 1.0).abs() < 1e-12, "none turns back");
