@@ -21,6 +21,9 @@ use crate::pipeline::solution::{Solution, solve};
 use crate::pipeline::tables::{Plan, Tabulated, table};
 use crate::pipeline::{Failure, Reporter, drives};
 
+/// A point that came to nothing before it could fly.
+type Fallen = Box<(Point, Failure)>;
+
 /// Points that are prepared at a time: their first meshes are in memory together.
 const CHUNK: usize = 32;
 
@@ -144,13 +147,14 @@ impl Work<'_> {
         let mut rest = group.into_iter().peekable();
         while rest.peek().is_some() {
             let chunk: Vec<Point> = rest.by_ref().take(CHUNK).collect();
-            let standing: Vec<Result<Standing, (Point, Failure)>> =
+            let standing: Vec<Result<Standing, Fallen>> =
                 chunk.into_par_iter().with_max_len(1).map(|point| self.stand(point)).collect();
             let mut flying = Vec::new();
             for standing in standing {
                 let standing = match standing {
                     Ok(standing) => standing,
-                    Err((point, failure)) => {
+                    Err(fallen) => {
+                        let (point, failure) = *fallen;
                         rows.push(self.failed(point, &failure, done)?);
                         continue;
                     }
@@ -177,13 +181,14 @@ impl Work<'_> {
             {
                 self.cache.write_solution(out, &first.case, solution)?;
             }
-            let planned: Vec<Result<Standing, (Point, Failure)>> =
+            let planned: Vec<Result<Standing, Fallen>> =
                 flying.into_par_iter().with_max_len(1).map(|standing| planned(standing, solution)).collect();
             let mut by_table: Vec<(Option<Digest>, Vec<Standing>)> = Vec::new();
             for standing in planned {
                 let standing = match standing {
                     Ok(standing) => standing,
-                    Err((point, failure)) => {
+                    Err(fallen) => {
+                        let (point, failure) = *fallen;
                         rows.push(self.failed(point, &failure, done)?);
                         continue;
                     }
@@ -238,7 +243,7 @@ impl Work<'_> {
     }
 
     /// The case of a point, with its first mesh and its grains.
-    fn stand(&self, point: Point) -> Result<Standing, (Point, Failure)> {
+    fn stand(&self, point: Point) -> Result<Standing, Fallen> {
         let quiet = Quiet::default();
         let stands = || -> Result<_, Failure> {
             let (case, source) = case_at(self.case, self.source, &point.values)?;
@@ -249,7 +254,7 @@ impl Work<'_> {
             Ok((case, source, ready)) => {
                 Ok(Standing { point, case, source, ready, plan: None, warnings: quiet.said() })
             }
-            Err(failure) => Err((point, failure)),
+            Err(failure) => Err(Box::new((point, failure))),
         }
     }
 
@@ -304,7 +309,7 @@ impl Work<'_> {
 }
 
 /// Plans the table of a point whose grains fly.
-fn planned(standing: Standing, solution: &Solution) -> Result<Standing, (Point, Failure)> {
+fn planned(standing: Standing, solution: &Solution) -> Result<Standing, Fallen> {
     let plan = || {
         let Standing { case, source, ready, .. } = &standing;
         check_starts_again(case, source, ready, &solution.basis)?;
@@ -315,7 +320,7 @@ fn planned(standing: Standing, solution: &Solution) -> Result<Standing, (Point, 
     };
     match plan() {
         Ok(plan) => Ok(Standing { plan, ..standing }),
-        Err(failure) => Err((standing.point, failure)),
+        Err(failure) => Err(Box::new((standing.point, failure))),
     }
 }
 
