@@ -178,16 +178,39 @@ impl Cache {
         solution: &Solution,
         table: Option<(&Plan, &Tabulated)>,
     ) -> Result<(), Failure> {
-        if !solution.kept {
-            self.write_one(out, Kind::Solution, &solution_key(case), solution)?;
+        self.write_solution(out, case, solution)?;
+        match table {
+            Some((plan, tabulated)) => self.write_table(out, case, plan, tabulated),
+            None => Ok(()),
         }
-        if let Some((plan, tabulated)) = table
-            && !tabulated.kept
-            && tabulated.report.bytes <= LARGEST_TABLE
-        {
-            self.write_one(out, Kind::Table, &table_key(case, plan), tabulated)?;
+    }
+
+    /// Keeps a solution if it is new.
+    ///
+    /// # Errors
+    /// The output fails.
+    pub fn write_solution(&self, out: &mut OutputFolder, case: &Case, solution: &Solution) -> Result<(), Failure> {
+        if solution.kept {
+            return Ok(());
         }
-        Ok(())
+        self.write_one(out, Kind::Solution, &solution_key(case), solution)
+    }
+
+    /// Keeps a table if it is new and no larger than is worth reading again.
+    ///
+    /// # Errors
+    /// The output fails.
+    pub fn write_table(
+        &self,
+        out: &mut OutputFolder,
+        case: &Case,
+        plan: &Plan,
+        tabulated: &Tabulated,
+    ) -> Result<(), Failure> {
+        if tabulated.kept || tabulated.report.bytes > LARGEST_TABLE {
+            return Ok(());
+        }
+        self.write_one(out, Kind::Table, &table_key(case, plan), tabulated)
     }
 
     fn write_one(

@@ -28,8 +28,8 @@
 //!
 //! [`pipeline`] has one file for each stage: a checked case ([`pipeline::ready`]), unit solutions to the accuracy asked
 //! ([`pipeline::solution`]), their table ([`pipeline::tables`]), the driven field ([`pipeline::drives`]) and the flights
-//! ([`pipeline::flights`]). [`output`] writes what came of them, [`plots`] draws, [`cache`] keeps solutions for the next run, and
-//! [`cli`] is the command.
+//! ([`pipeline::flights`]). [`output`] writes what came of them, [`plots`] draws, [`cache`] keeps solutions for the next run,
+//! [`study`] does it for many points of a sweep, and [`cli`] is the command.
 
 pub mod cache;
 pub mod case;
@@ -48,6 +48,7 @@ mod reader;
 mod resolve;
 mod schema;
 mod set;
+pub mod study;
 mod suggestion;
 mod syntax;
 mod tree;

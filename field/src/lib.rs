@@ -68,6 +68,7 @@ pub mod electrode_basis;
 mod errors;
 pub mod gather;
 mod gauss;
+pub mod grid_sheet;
 pub mod harmonics;
 pub mod induction;
 pub mod influence;
@@ -87,6 +88,7 @@ pub mod source;
 mod symmetry;
 pub mod table;
 pub mod waveform;
+pub mod zonal;
 
 pub use basis_field::{BasisField, Samples};
 pub use boundary_problem::{BoundaryProblem, By, SolveError, SolveReport};
@@ -95,6 +97,7 @@ pub use channels::Channels;
 pub use driven::DrivenField;
 pub use electrode_basis::{ElectrodeBasis, SurfaceCharge};
 pub use errors::Errors;
+pub use grid_sheet::{GridSheet, grid_sheet};
 pub use induction::Induction;
 pub use linear_operator::LinearOperator;
 pub use panel::Panel;
@@ -107,3 +110,4 @@ pub use table::{
     TabulatedField, halvings_for, tabulate, tabulate_around,
 };
 pub use waveform::{Waveform, WaveformPart};
+pub use zonal::{Zonal, zonal};

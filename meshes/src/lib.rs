@@ -34,6 +34,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod grid_optics;
 pub mod import;
 pub mod lattice;
 pub mod patch;
@@ -46,6 +47,7 @@ pub mod triangle;
 pub mod triangulate;
 pub mod vtk;
 
+pub use grid_optics::{GridPatch, Incidence, open_fraction};
 pub use patch::{Column, Patch, PatchForm, Path, Side, patches};
 pub use profile::{Curve, Joint, Profile, Revolved, revolved};
 pub use report::{ElectrodeReport, MeshReport};

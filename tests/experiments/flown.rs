@@ -2,11 +2,10 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
 
 use cases::Case;
 use cases::pipeline::drives::{Driven, tabulated_field};
-use cases::pipeline::flights::{Flights, Kept, fly, obstacles};
+use cases::pipeline::flights::{Flights, fly, obstacles};
 use cases::pipeline::ready::{flight_region, ready};
 use cases::pipeline::solution::solve;
 use cases::pipeline::tables::{Plan, table};
@@ -14,7 +13,7 @@ use cases::pipeline::{Failure, Reporter, Silent};
 use field::{BasisField, Samples};
 use meshes::Vec3;
 use tracer::spectrum::{Line, spectrum};
-use tracer::{Frame, Journal, Outcome, Sample};
+use tracer::{Outcome, Sample};
 
 /// What came of a case.
 pub struct Flown {
@@ -24,18 +23,6 @@ pub struct Flown {
     pub driven: Driven,
     /// Its flights.
     pub flights: Flights,
-}
-
-struct NoJournal;
-
-impl Journal for NoJournal {
-    fn interval(&self) -> Duration {
-        Duration::MAX
-    }
-
-    fn keep(&self, _: &Frame) -> Result<(), String> {
-        Ok(())
-    }
 }
 
 /// Flies a shipped case, some keys set. A table where the tracks stay, given by a test, is faster than one of the whole trap.
@@ -53,10 +40,9 @@ pub fn flown(name: &str, sets: &[&str]) -> Flown {
         let mesh = &solution.basis.mesh;
         let region = flight_region(&case, mesh);
         let surface = obstacles(mesh, case.field.ground.as_ref(), &region);
-        let kept = Kept { journal: Arc::new(NoJournal), standing: None };
         let settings = case.trace.as_ref().expect("an experiment is traced");
         let field = driven.field.clone();
-        let flights = fly(&case, settings, &source, field, None, surface, &ready.ensemble, region, kept, &reporter)?;
+        let flights = fly(&case, settings, &source, field, None, surface, &ready.ensemble, region, None, &reporter)?;
         Ok((driven, flights))
     };
     let (driven, flights) = fly_it().unwrap_or_else(|e| panic!("{name}: {e:?}"));

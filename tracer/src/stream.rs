@@ -9,6 +9,8 @@ pub enum Purpose {
     Start = 1,
     /// The kicks of the gas during a step.
     Noise = 2,
+    /// The points of a study that draws samples; the "grain" is the varied key.
+    Sample = 3,
 }
 
 /// The stream of random numbers of one grain at one step: a counter-based generator, so that any of 2^128 streams begins

@@ -12,11 +12,14 @@ use field::Waveform;
 use serde::Serialize;
 
 pub use crate::keys::settings::{Gas, Integrator, Method, Reflection, Solver};
+pub use crate::keys::study::StudyKind;
+pub use crate::keys::sweep::Sampling;
 pub use analysis::{Analysis, Chart, ChartAxis, ChartGrains, ChartVoltages, WantedMultipole, Wish};
 pub use electrode::{Drive, Electrode, ElectrodeShape, ImportedMesh, MeshFormat, Source, SourceKind};
 pub use parts::CaseParts;
 pub use settings::{
-    Drag, FieldSettings, Forces, GROUND, GrainGroup, Output, Region, Sweep, SweepAxis, TableSettings, TraceSettings,
+    Drag, FieldSettings, Forces, GROUND, GrainGroup, Output, Region, Study, Sweep, SweepAxis, TableSettings,
+    TraceSettings, Weighing,
 };
 
 use crate::case_source::CaseSource;
@@ -50,6 +53,8 @@ pub struct Case {
     pub analysis: Analysis,
     /// What a study varies.
     pub sweep: Option<Sweep>,
+    /// What a study looks at.
+    pub study: Study,
 }
 
 impl Case {

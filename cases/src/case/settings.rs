@@ -5,7 +5,7 @@ use meshes::Vec3;
 use serde::Serialize;
 use tracer::{Launch, Place};
 
-use super::{Gas, Integrator, Method, Reflection, Solver, foreign};
+use super::{Gas, Integrator, Method, Reflection, Sampling, Solver, StudyKind, foreign};
 
 /// How exactly the field is computed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -159,7 +159,9 @@ pub struct Output {
 pub struct Sweep {
     /// What is varied, in the order of the file; at least one.
     pub axes: Vec<SweepAxis>,
-    /// What to report of each run.
+    /// How the values of several keys are combined.
+    pub sampling: Sampling,
+    /// What to report of each point; none: everything.
     pub report: Vec<String>,
 }
 
@@ -168,6 +170,72 @@ pub struct Sweep {
 pub struct SweepAxis {
     /// A key path of the case.
     pub key: String,
-    /// Each as text that stands behind the `=` of a `--set`; at least one.
+    /// Each as text that stands behind the `=` of a `--set`; at least one. Unless `sampling` is a grid, one for each point.
     pub values: Vec<String>,
+    /// They are spread with equal ratios.
+    pub log: bool,
+    /// The ends of the range they are from, in their unit, where they are from one.
+    pub range: Option<[f64; 2]>,
+    /// The unit of the range; empty for pure numbers.
+    pub unit: String,
+}
+
+impl Sweep {
+    /// How many points there are; `None` beyond any number.
+    pub fn count(&self) -> Option<usize> {
+        match self.sampling {
+            Sampling::Grid => self.axes.iter().try_fold(1_usize, |n, axis| n.checked_mul(axis.values.len())),
+            _ => self.axes.first().map(|axis| axis.values.len()),
+        }
+    }
+
+    /// The values of one point, one for each axis. Of a grid the last axis changes fastest.
+    pub fn point(&self, number: usize) -> Vec<&str> {
+        let mut rest = number;
+        let mut values: Vec<&str> = self
+            .axes
+            .iter()
+            .rev()
+            .map(|axis| {
+                let n = if self.sampling == Sampling::Grid { rest % axis.values.len() } else { number };
+                rest /= axis.values.len();
+                axis.values[n].as_str()
+            })
+            .collect();
+        values.reverse();
+        values
+    }
+}
+
+/// What a study asks, and where it looks.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Study {
+    /// What is asked.
+    pub kind: StudyKind,
+    /// About which point multipoles are told, m; `None`: the middle of the trap region.
+    pub center: Option<Vec3>,
+    /// Along which axis, of unit length.
+    pub axis: Vec3,
+    /// On which sphere, m; `None`: half the way to the nearest conductor.
+    pub radius: Option<f64>,
+    /// Angles from the normal at which light falls on grids, rad; below a right angle.
+    pub angles: Vec<f64>,
+    /// Half angle of a cone from which it falls, rad.
+    pub cone: Option<f64>,
+    /// How many rays each transparency is told from.
+    pub rays: usize,
+    /// What a study of grids weighs. Rows do not depend on it.
+    #[serde(skip)]
+    pub weighing: Weighing,
+}
+
+/// What makes a grid the best: the least of `weight` (1 - T) + deviation / `tolerated`, T the transparency.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weighing {
+    /// Of light that is lost.
+    pub weight: f64,
+    /// Deviation of the field that is tolerated, against the strongest.
+    pub tolerated: f64,
+    /// The narrowest wire, or bar between holes, that can be made, m.
+    pub smallest_wire: f64,
 }

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 
+use crate::study::shard::Shard;
+
 /// Electrostatic field solver and grain tracer: from a case file to fields, trajectories and pictures.
 #[derive(Debug, Parser)]
 #[command(name = "graintrap", version, max_term_width = 100)]
@@ -31,6 +33,8 @@ pub(super) enum Verb {
     Table(Common),
     /// Like run, for a case that must have grains to trace
     Trace(RunArguments),
+    /// A sweep: the case at many points, resumable, in shards if wanted
+    Study(StudyArguments),
     /// Print the JSON Schema of the case file, for editors
     Schema,
     /// Print a script that completes arguments in a shell
@@ -50,6 +54,7 @@ impl Verb {
             | Self::Analyse(common) => Some(common),
             Self::Run(arguments) | Self::Trace(arguments) => Some(&arguments.common),
             Self::Probe(arguments) => Some(&arguments.common),
+            Self::Study(arguments) => Some(&arguments.common),
             Self::Schema | Self::Completions { .. } => None,
         }
     }
@@ -89,6 +94,19 @@ pub(super) struct RunArguments {
     /// Go on where a run that was stopped or killed left the grains, to the same results
     #[arg(long)]
     pub resume: bool,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(super) struct StudyArguments {
+    #[command(flatten)]
+    pub common: Common,
+    /// Only the i-th of n parts of the points, into a folder of its own
+    /// [default: what Slurm or an MPI launcher says, else everything]
+    #[arg(long, value_name = "i/n", conflicts_with = "merge")]
+    pub shard: Option<Shard>,
+    /// Join the parts that shards wrote
+    #[arg(long, value_name = "DIR", num_args = 1..)]
+    pub merge: Vec<PathBuf>,
 }
 
 #[derive(Args, Clone, Debug)]

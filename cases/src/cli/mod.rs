@@ -10,6 +10,7 @@ mod probe;
 mod progress;
 mod run;
 mod session;
+mod study;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -45,6 +46,7 @@ fn dispatch(verb: &Verb) -> Result<(), Failure> {
         Verb::Table(common) => fields::fields(&open(common)?, Extent::Table),
         Verb::Analyse(common) => analyse::analyse(&open(common)?),
         Verb::Probe(arguments) => probe::probe(&open(&arguments.common)?, arguments),
+        Verb::Study(arguments) => study::study(open(&arguments.common)?, arguments),
         Verb::Schema => {
             let text = serde_json::to_string_pretty(&schema()).unwrap_or_default();
             print(&format!("{text}\n"));

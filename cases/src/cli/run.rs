@@ -38,7 +38,7 @@ pub(super) fn run(session: &Session, resume: bool, trace: bool) -> Result<(), Fa
         let reporter: Arc<dyn Reporter> = session.progress.clone();
         let every = case.output.checkpoint.map(|s| Duration::try_from_secs_f64(s).unwrap_or(Duration::MAX));
         let journal = Checkpoint::new(&session.folder, case, every, left.as_ref(), out.early("cache"))?;
-        let kept = Kept { journal: Arc::new(journal), standing: left.map(|left| Arc::new(left.standing)) };
+        let kept = Some(Kept { journal: Arc::new(journal), standing: left.map(|left| Arc::new(left.standing)) });
         let induction = induction(case, source, &ready.electrodes, &*reporter)?;
         let flights =
             fly(case, settings, source, driven.field, induction, surface, &ready.ensemble, region, kept, &reporter)?;

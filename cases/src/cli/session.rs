@@ -91,6 +91,13 @@ impl Session {
         }
     }
 
+    /// A word to the user that is no warning.
+    pub fn remark(&self, text: &str) {
+        if !self.quiet {
+            eprintln!("{text}");
+        }
+    }
+
     /// What was kept, with a word to the user if a file is there that is of no use.
     pub fn kept<T>(&self, read: Result<Option<T>, (PathBuf, Unusable)>) -> Option<T> {
         read.unwrap_or_else(|(path, why)| {

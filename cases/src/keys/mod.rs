@@ -8,6 +8,7 @@ pub(crate) mod electrode;
 pub(crate) mod grains;
 pub(crate) mod settings;
 pub(crate) mod source;
+pub(crate) mod study;
 pub(crate) mod sweep;
 pub(crate) mod value;
 pub(crate) mod waveform;
@@ -55,4 +56,7 @@ pub(crate) struct CaseKeys {
     pub analysis: analysis::AnalysisKeys,
     /// Keys to vary: turns the case into a study.
     pub sweep: Option<sweep::SweepTable>,
+    /// What a study asks.
+    #[serde(default)]
+    pub study: study::StudyKeys,
 }

@@ -292,7 +292,7 @@ pub fn fly(
     surface: Option<Arc<SurfaceTree>>,
     ensemble: &Ensemble,
     region: Region,
-    kept: Kept,
+    kept: Option<Kept>,
     reporter: &Arc<dyn Reporter>,
 ) -> Result<Flights, Failure> {
     reporter.stage("trace");
@@ -304,7 +304,8 @@ pub fn fly(
     let limit = (memory::available() / 4).min(1 << 30) as usize;
     // A checkpoint holds all samples, those that are left out of the tracks with them: where these are too many, so are those.
     let samples = ensemble.len() as f64 * (settings.duration / every);
-    let journal = (samples * size_of::<Sample>() as f64 <= limit as f64).then_some(kept.journal);
+    let (journal, standing) = kept.map_or((None, None), |kept| (Some(kept.journal), kept.standing));
+    let journal = journal.filter(|_| samples * size_of::<Sample>() as f64 <= limit as f64);
     let system = system(case, field, induction, surface, region);
     let listener = Arc::clone(reporter);
     let options = Options {
@@ -325,7 +326,7 @@ pub fn fly(
         every: Some(every),
         seed: settings.seed,
         journal,
-        resume: kept.standing,
+        resume: standing,
         progress: Some(Arc::new(move |done| listener.fraction(done))),
         ..Options::default()
     };

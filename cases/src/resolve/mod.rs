@@ -10,6 +10,7 @@ mod names;
 mod settings;
 mod shapes;
 mod sources;
+mod study;
 mod sweep;
 mod waveforms;
 
@@ -62,6 +63,7 @@ fn resolved(source: &CaseSource, with_chart: bool) -> Result<Case, CaseError> {
         output: settings::output(&keys.output),
         analysis,
         sweep: keys.sweep.map(|keys| sweep::sweep(&root.key("sweep"), keys)).transpose()?,
+        study: study::study(&root.key("study"), &keys.study)?,
     };
     if let Some(keys) = keys.analysis.chart.as_ref().filter(|_| with_chart) {
         case.analysis.chart = Some(chart::chart(&root.key("analysis").key("chart"), keys, &case)?);

@@ -15,3 +15,4 @@ mod odd;
 mod resume;
 mod same;
 mod stopped;
+mod study;
