@@ -31,17 +31,17 @@ pub(super) struct Kernel {
 }
 
 /// Where a point lies.
-#[derive(Clone, Copy, Default)]
-struct Found {
+#[derive(Clone, Copy)]
+struct Found<L: Lanes> {
     /// The number of the point.
     point: u32,
     slot: u32,
-    /// The cell within the brick.
-    cell: [u8; 3],
+    /// Where the coefficients that it needs begin, within those of its brick and a channel.
+    first: usize,
     /// Where in the cell, from 0 to 1.
-    part: [f64; 3],
-    /// Cells per metre.
-    scale: [f64; 3],
+    part: L::V,
+    /// 1 and cells per metre, from slopes per cell to slopes per metre.
+    scale: L::V,
 }
 
 /// What is wanted of each point.
@@ -118,62 +118,6 @@ impl Kernel {
         }
         Run::<Plain, REACH> { lanes: Plain, kernel: self, numbers, channels, points, wanted, left }.run();
     }
-
-    /// The brick and cell of a point.
-    #[inline(always)]
-    fn locate(&self, point: &Vec3) -> Option<Found> {
-        let inside = (point.x >= self.min.x)
-            & (point.x <= self.max.x)
-            & (point.y >= self.min.y)
-            & (point.y <= self.max.y)
-            & (point.z >= self.min.z)
-            & (point.z <= self.max.z);
-        if !inside {
-            return None;
-        }
-        let mut at = [0.0; 3];
-        let mut root = [0_u32; 3];
-        for (k, (at, root)) in at.iter_mut().zip(&mut root).enumerate() {
-            let bricks = (point[k] - self.min[k]) * self.per_metre[k];
-            // The upper face belongs to the last brick.
-            *root = (bricks as i32 as u32).min(self.roots[k] - 1);
-            *at = bricks - f64::from(*root as i32);
-        }
-        let mut number = root[0] + self.roots[0] * (root[1] + self.roots[1] * root[2]);
-        let mut size = CELLS as f64;
-        let mut next = self.descent[number as usize];
-        while next & WHOLE == 0 {
-            let mut part = 0;
-            for (k, x) in at.iter_mut().enumerate() {
-                let upper = *x >= 0.5;
-                part |= u32::from(upper) << k;
-                *x = 2.0 * *x - if upper { 1.0 } else { 0.0 };
-            }
-            size *= 2.0;
-            number = next + part;
-            next = self.descent[number as usize];
-        }
-        if next == NONE {
-            return None;
-        }
-        let mut found = Found { slot: next & !WHOLE, ..Found::default() };
-        for (k, at) in at.into_iter().enumerate() {
-            let cells = CELLS as f64 * at;
-            let cell = (cells as i32).min(CELLS as i32 - 1);
-            found.cell[k] = cell as u8;
-            found.part[k] = cells - f64::from(cell);
-            found.scale[k] = size * self.per_metre[k];
-        }
-        Some(found)
-    }
-}
-
-impl Found {
-    /// From slopes per cell to slopes per metre.
-    #[inline(always)]
-    fn per_metre(&self, slope: [f64; 3]) -> Vec3 {
-        Vec3::new(slope[0] * self.scale[0], slope[1] * self.scale[1], slope[2] * self.scale[2])
-    }
 }
 
 /// A call for some points.
@@ -203,15 +147,17 @@ impl<L: Lanes, const REACH: usize> Run<'_, L, REACH> {
 
     #[inline(always)]
     fn run(mut self) {
-        let mut found = [Found::default(); BATCH];
+        let zero = self.lanes.splat(0.0);
+        let mut found = [Found::<L> { point: 0, slot: 0, first: 0, part: zero, scale: zero }; BATCH];
+        let finder = Finder::<L, REACH>::new(self.lanes, self.kernel);
         for (batch, points) in self.points.chunks(BATCH).enumerate() {
             let mut count = 0;
             for (p, point) in points.iter().enumerate() {
                 let number = batch * BATCH + p;
-                match self.kernel.locate(point) {
+                match finder.find(point, number as u32) {
                     Some(place) => {
-                        found[count] = Found { point: number as u32, ..place };
-                        self.fetch(&found[count]);
+                        self.fetch(&place);
+                        found[count] = place;
                         count += 1;
                     }
                     None => self.left.push(number),
@@ -223,20 +169,13 @@ impl<L: Lanes, const REACH: usize> Run<'_, L, REACH> {
         }
     }
 
-    /// Where the coefficients that a point needs begin, within those of its brick and a channel.
-    #[inline(always)]
-    fn first(found: &Found) -> usize {
-        let [x, y, z] = found.cell.map(usize::from);
-        x + stride(REACH) * (y + edge(REACH) * z)
-    }
-
     /// Asks for the lines of memory that a point will need.
     #[inline(always)]
-    fn fetch(&self, found: &Found) {
+    fn fetch(&self, found: &Found<L>) {
         #[cfg(target_arch = "x86_64")]
         {
             use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-            let first = found.slot as usize * self.channels * per_brick(REACH) + Self::first(found);
+            let first = found.slot as usize * self.channels * per_brick(REACH) + found.first;
             let first: *const f64 = self.numbers.as_ptr().wrapping_add(first);
             for z in 0..Self::WINDOW {
                 for y in 0..Self::WINDOW {
@@ -253,75 +192,148 @@ impl<L: Lanes, const REACH: usize> Run<'_, L, REACH> {
     }
 
     #[inline(always)]
-    fn evaluate(&mut self, found: &Found) {
-        let (channels, brick) = (self.channels, per_brick(REACH));
+    fn evaluate(&mut self, found: &Found<L>) {
+        let (lanes, channels, brick) = (self.lanes, self.channels, per_brick(REACH));
         let p = found.point as usize;
-        let weights = Weights::<L, REACH>::new(self.lanes, &found.part);
+        let weights = Weights::<L, REACH>::new(lanes, found.part);
         let first = found.slot as usize * channels * brick;
         let numbers = &self.numbers[first..first + channels * brick];
-        let start = Self::first(found);
         match &mut self.wanted {
             Wanted::Channels { potential, gradient } => {
-                let (potential, gradient) = (&mut potential[p * channels..], &mut gradient[p * channels..]);
-                for (c, numbers) in numbers.chunks_exact(brick).enumerate() {
-                    let [value, x, y, z] = weights.contract(self.lanes, &[&numbers[start..]], &[1.0]);
-                    (potential[c], gradient[c]) = (value, found.per_metre([x, y, z]));
+                for c in 0..channels {
+                    let window = Self::window(numbers, found, c);
+                    let sums = weights.contract(lanes, &[window], &[1.0]);
+                    let [value, x, y, z] = lanes.numbers(lanes.mul(sums, found.scale));
+                    (potential[p * channels + c], gradient[p * channels + c]) = (value, Vec3::new(x, y, z));
                 }
             }
             Wanted::Sum { factors, potential, gradient } => {
                 let factors = &factors[p * channels..(p + 1) * channels];
-                let [value, x, y, z] = match *factors {
-                    [one] => weights.contract(self.lanes, &[&numbers[start..]], &[one]),
-                    [a, b] => {
-                        let (first, second) = numbers.split_at(brick);
-                        weights.contract(self.lanes, &[&first[start..], &second[start..]], &[a, b])
-                    }
+                let first = Self::window(numbers, found, 0);
+                let sums = match *factors {
+                    [one] => weights.contract(lanes, &[first], &[one]),
+                    [a, b] => weights.contract(lanes, &[first, Self::window(numbers, found, 1)], &[a, b]),
                     _ => {
-                        let mut sums = [0.0; 4];
-                        for (numbers, factor) in numbers.chunks_exact(brick).zip(factors) {
-                            let own = weights.contract(self.lanes, &[&numbers[start..]], &[*factor]);
-                            (0..4).for_each(|k| sums[k] += own[k]);
+                        let mut sums = lanes.splat(0.0);
+                        for c in 0..channels {
+                            let own = weights.contract(lanes, &[Self::window(numbers, found, c)], &[1.0]);
+                            sums = lanes.mul_add(own, lanes.splat(factors[c]), sums);
                         }
                         sums
                     }
                 };
-                (potential[p], gradient[p]) = (value, found.per_metre([x, y, z]));
+                let [value, x, y, z] = lanes.numbers(lanes.mul(sums, found.scale));
+                (potential[p], gradient[p]) = (value, Vec3::new(x, y, z));
             }
         }
     }
+
+    /// What a point needs of a channel of its brick: the rows from its first to its last.
+    #[inline(always)]
+    fn window<'b>(brick: &'b [f64], found: &Found<L>, channel: usize) -> &'b [f64] {
+        let first = channel * per_brick(REACH) + found.first;
+        &brick[first..first + window(REACH)]
+    }
+}
+
+/// Finds the bricks and cells of points.
+struct Finder<'a, L: Lanes, const REACH: usize> {
+    lanes: L,
+    descent: &'a [u32],
+    min: L::V,
+    max: L::V,
+    /// Coarsest bricks per metre.
+    per_metre: L::V,
+    /// The last of the coarsest bricks along each axis.
+    last: L::V,
+    /// From the coarsest brick along each axis to its number.
+    number: L::V,
+    /// 1 and the finest cells of the coarsest bricks per metre.
+    scale: L::V,
+}
+
+impl<'a, L: Lanes, const REACH: usize> Finder<'a, L, REACH> {
+    #[inline(always)]
+    fn new(lanes: L, kernel: &'a Kernel) -> Self {
+        let (min, max, rate) = (kernel.min, kernel.max, kernel.per_metre);
+        let [x, y, z] = kernel.roots.map(f64::from);
+        let cells = CELLS as f64;
+        Self {
+            lanes,
+            descent: &kernel.descent,
+            min: lanes.of([min.x, min.y, min.z, 0.0]),
+            max: lanes.of([max.x, max.y, max.z, 0.0]),
+            per_metre: lanes.of([rate.x, rate.y, rate.z, 0.0]),
+            last: lanes.of([x - 1.0, y - 1.0, z - 1.0, 0.0]),
+            number: lanes.of([1.0, x, x * y, 0.0]),
+            scale: lanes.of([1.0, cells * rate.x, cells * rate.y, cells * rate.z]),
+        }
+    }
+
+    #[inline(always)]
+    fn find(&self, point: &Vec3, number: u32) -> Option<Found<L>> {
+        let lanes = self.lanes;
+        let point = lanes.of([point.x, point.y, point.z, 0.0]);
+        let one = lanes.splat(1.0);
+        if lanes.at_least(point, self.min) & lanes.at_least(self.max, point) != 0b1111 {
+            return None;
+        }
+        let bricks = lanes.mul(lanes.sub(point, self.min), self.per_metre);
+        // The upper face belongs to the last brick.
+        let root = lanes.min(lanes.floor(bricks), self.last);
+        let mut at = lanes.sub(bricks, root);
+        let mut next = self.descent[whole(lanes.dot(root, self.number))];
+        let mut scale = self.scale;
+        while next & WHOLE == 0 {
+            let part = lanes.at_least(at, lanes.splat(0.5)) & 0b111;
+            let double = lanes.mul_add(at, one, at);
+            at = lanes.sub(double, lanes.min(lanes.floor(double), one));
+            scale = lanes.mul(scale, lanes.of([1.0, 2.0, 2.0, 2.0]));
+            next = self.descent[(next + part) as usize];
+        }
+        if next == NONE {
+            return None;
+        }
+        let cells = lanes.mul(at, lanes.splat(CELLS as f64));
+        let cell = lanes.min(lanes.floor(cells), lanes.splat(CELLS as f64 - 1.0));
+        let rows = stride(REACH) as f64;
+        let first = whole(lanes.dot(cell, lanes.of([1.0, rows, rows * edge(REACH) as f64, 0.0])));
+        Some(Found { point: number, slot: next & !WHOLE, first, part: lanes.sub(cells, cell), scale })
+    }
+}
+
+/// A whole number from 0 to 2^32 - 1 as one: it becomes the last bits of the sum with 2^52. A conversion with `as` would take five
+/// times as long to make sure of what is known here.
+#[inline(always)]
+fn whole(number: f64) -> usize {
+    ((number + (1_u64 << 52) as f64).to_bits() as u32) as usize
 }
 
 /// Values and slopes (per cell) of the B-splines along each axis that do not vanish at a point.
 struct Weights<L: Lanes, const REACH: usize> {
-    /// Along x: values, slopes, in vectors of four; those of degree five end with two zeros.
+    /// Along x: values and slopes, in vectors of four; those of degree five end with two zeros.
     x: [[L::V; 2]; 2],
-    /// The k-th spline along y and z: values, slopes.
-    y: [[f64; 2]; 6],
-    z: [[f64; 2]; 6],
+    /// Along y and z: values and slopes.
+    y: [[f64; 8]; 2],
+    z: [[f64; 8]; 2],
 }
 
 impl<L: Lanes, const REACH: usize> Weights<L, REACH> {
     #[inline(always)]
-    fn new(lanes: L, part: &[f64; 3]) -> Self {
-        let [x, y, z] = [splines::<REACH>(part[0]), splines::<REACH>(part[1]), splines::<REACH>(part[2])];
-        let mut vectors = [[lanes.splat(0.0); 2]; 2];
-        for d in 0..2 {
-            vectors[d][0] = lanes.of([x[d][0], x[d][1], x[d][2], x[d][3]]);
-            if REACH == QUINTIC {
-                vectors[d][1] = lanes.of([x[d][4], x[d][5], 0.0, 0.0]);
-            }
+    fn new(lanes: L, part: L::V) -> Self {
+        let [x, y, z, _] = lanes.numbers(part);
+        let ([x, x_slope], [y, y_slope], [z, z_slope]) =
+            (splines::<L, REACH>(lanes, x), splines::<L, REACH>(lanes, y), splines::<L, REACH>(lanes, z));
+        Self {
+            x: [x, x_slope],
+            y: [numbers(lanes, y), numbers(lanes, y_slope)],
+            z: [numbers(lanes, z), numbers(lanes, z_slope)],
         }
-        let (mut along_y, mut along_z) = ([[0.0; 2]; 6], [[0.0; 2]; 6]);
-        for k in 0..2 * REACH {
-            along_y[k] = [y[0][k], y[1][k]];
-            along_z[k] = [z[0][k], z[1][k]];
-        }
-        Self { x: vectors, y: along_y, z: along_z }
     }
 
     /// Value and slopes along x, y and z of a sum of channels with factors, from the coefficients of each from the first on.
     #[inline(always)]
-    fn contract<const N: usize>(&self, lanes: L, numbers: &[&[f64]; N], factors: &[f64; N]) -> [f64; 4] {
+    fn contract<const N: usize>(&self, lanes: L, numbers: &[&[f64]; N], factors: &[f64; N]) -> L::V {
         let zero = lanes.splat(0.0);
         let mut sums = [zero; 4];
         for half in 0..REACH - 1 {
@@ -329,7 +341,7 @@ impl<L: Lanes, const REACH: usize> Weights<L, REACH> {
             let mut plain = [zero; 6];
             let mut sloped = [zero; 6];
             for k in 0..2 * REACH {
-                let (value, slope) = (lanes.splat(self.z[k][0]), lanes.splat(self.z[k][1]));
+                let (value, slope) = (lanes.splat(self.z[0][k]), lanes.splat(self.z[1][k]));
                 for j in 0..2 * REACH {
                     let place = stride(REACH) * (j + edge(REACH) * k) + 4 * half;
                     let mut row = zero;
@@ -349,7 +361,7 @@ impl<L: Lanes, const REACH: usize> Weights<L, REACH> {
             }
             let (mut value, mut along_y, mut along_z) = (zero, zero, zero);
             for j in 0..2 * REACH {
-                let (y, slope) = (lanes.splat(self.y[j][0]), lanes.splat(self.y[j][1]));
+                let (y, slope) = (lanes.splat(self.y[0][j]), lanes.splat(self.y[1][j]));
                 value = lanes.mul_add(plain[j], y, value);
                 along_y = lanes.mul_add(plain[j], slope, along_y);
                 along_z = lanes.mul_add(sloped[j], y, along_z);
@@ -361,40 +373,74 @@ impl<L: Lanes, const REACH: usize> Weights<L, REACH> {
             sums[3] = lanes.mul_add(along_z, x, sums[3]);
         }
         let sums = lanes.sums(sums);
-        if N == 1 {
-            return [factors[0] * sums[0], factors[0] * sums[1], factors[0] * sums[2], factors[0] * sums[3]];
-        }
-        sums
+        if N == 1 { lanes.mul(sums, lanes.splat(factors[0])) } else { sums }
     }
 }
+
+/// Numbers from the first to the last that a point needs of a channel.
+const fn window(reach: usize) -> usize {
+    let last = 2 * reach - 1;
+    stride(reach) * (last + edge(reach) * last) + 4 * (reach - 1)
+}
+
+/// 6 times the B-splines of degree three that do not vanish in a cell, those of the last node first: lane k of entry n is the
+/// coefficient of t^n of spline k (de Boor, A Practical Guide to Splines, 1978).
+const OF_DEGREE_3: [[f64; 4]; 4] =
+    [[1.0, 4.0, 1.0, 0.0], [-3.0, 0.0, 3.0, 0.0], [3.0, -6.0, 3.0, 0.0], [-1.0, 3.0, -3.0, 1.0]];
+
+/// 120 times those of degree five: the first four, and the last two with two zeros.
+const OF_DEGREE_5: [[[f64; 4]; 6]; 2] = [
+    [
+        [1.0, 26.0, 66.0, 26.0],
+        [-5.0, -50.0, 0.0, 50.0],
+        [10.0, 20.0, -60.0, 20.0],
+        [-10.0, 20.0, 0.0, -20.0],
+        [5.0, -20.0, 30.0, -20.0],
+        [-1.0, 5.0, -10.0, 10.0],
+    ],
+    [
+        [1.0, 0.0, 0.0, 0.0],
+        [5.0, 0.0, 0.0, 0.0],
+        [10.0, 0.0, 0.0, 0.0],
+        [10.0, 0.0, 0.0, 0.0],
+        [5.0, 0.0, 0.0, 0.0],
+        [-5.0, 1.0, 0.0, 0.0],
+    ],
+];
 
 /// Values and slopes (per cell) of the B-splines that do not vanish at t in [0, 1] of a cell: four of degree three or six of degree
 /// five.
 #[inline(always)]
-fn splines<const REACH: usize>(t: f64) -> [[f64; 6]; 2] {
-    let s = 1.0 - t;
-    let (t2, s2) = (t * t, s * s);
+fn splines<L: Lanes, const REACH: usize>(lanes: L, t: f64) -> [[L::V; 2]; 2] {
     if REACH == CUBIC {
-        let sixth = 1.0 / 6.0;
-        let value =
-            [sixth * s2 * s, (0.5 * t - 1.0) * t2 + 2.0 / 3.0, (0.5 * s - 1.0) * s2 + 2.0 / 3.0, sixth * t2 * t];
-        let slope = [-0.5 * s2, t * (1.5 * t - 2.0), s * (2.0 - 1.5 * s), 0.5 * t2];
-        return [
-            [value[0], value[1], value[2], value[3], 0.0, 0.0],
-            [slope[0], slope[1], slope[2], slope[3], 0.0, 0.0],
-        ];
+        let [value, slope] = horner(lanes, t, &OF_DEGREE_3, 1.0 / 6.0);
+        let zero = lanes.splat(0.0);
+        return [[value, zero], [slope, zero]];
     }
-    // 120 B and 24 B' in powers of t (de Boor, A Practical Guide to Splines, 1978).
-    let (f, g) = (1.0 / 120.0, 1.0 / 24.0);
-    let (t4, s4) = (t2 * t2, s2 * s2);
-    let second = |t: f64| ((((5.0 * t - 20.0) * t + 20.0) * t + 20.0) * t - 50.0) * t + 26.0;
-    let third = |t: f64| ((-10.0 * t + 30.0) * t * t - 60.0) * t * t + 66.0;
-    let second_slope = |t: f64| (((5.0 * t - 16.0) * t + 12.0) * t + 8.0) * t - 10.0;
-    let third_slope = |t: f64| ((-10.0 * t + 24.0) * t * t - 24.0) * t;
-    [
-        [f * s4 * s, f * second(t), f * third(t), f * third(s), f * second(s), f * t4 * t],
-        [-g * s4, g * second_slope(t), g * third_slope(t), -g * third_slope(s), -g * second_slope(s), g * t4],
-    ]
+    let first = horner(lanes, t, &OF_DEGREE_5[0], 1.0 / 120.0);
+    let last = horner(lanes, t, &OF_DEGREE_5[1], 1.0 / 120.0);
+    [[first[0], last[0]], [first[1], last[1]]]
+}
+
+#[inline(always)]
+fn numbers<L: Lanes>(lanes: L, [a, b]: [L::V; 2]) -> [f64; 8] {
+    let ([a, b, c, d], [e, f, g, h]) = (lanes.numbers(a), lanes.numbers(b));
+    [a, b, c, d, e, f, g, h]
+}
+
+/// Values and slopes of polynomials with a factor.
+#[inline(always)]
+fn horner<L: Lanes, const N: usize>(lanes: L, t: f64, of: &[[f64; 4]; N], factor: f64) -> [L::V; 2] {
+    let t = lanes.splat(t);
+    let mut value = lanes.of(of[N - 1]);
+    let mut slope = lanes.splat(0.0);
+    // Not through iterators: their closures do not know what the machine has.
+    for n in (0..N - 1).rev() {
+        slope = lanes.mul_add(slope, t, value);
+        value = lanes.mul_add(value, t, lanes.of(of[n]));
+    }
+    let factor = lanes.splat(factor);
+    [lanes.mul(value, factor), lanes.mul(slope, factor)]
 }
 
 #[cfg(test)]
@@ -402,20 +448,21 @@ mod tests {
     use super::*;
 
     fn check<const REACH: usize>() {
+        let splines = |t: f64| splines::<Plain, REACH>(Plain, t).map(|[a, b]| [a[0], a[1], a[2], a[3], b[0], b[1]]);
         for t in [0.0, 0.2, 0.71, 1.0] {
-            let [value, slope] = splines::<REACH>(t);
+            let [value, slope] = splines(t);
             assert!((value.iter().sum::<f64>() - 1.0).abs() < 1e-15 && slope.iter().sum::<f64>().abs() < 1e-15);
             // The nodes' own places: a spline reproduces them.
             let place: f64 = (0..6).map(|k| (k as f64 - (REACH as f64 - 1.0)) * value[k]).sum();
             assert!((place - t).abs() < 2e-15);
-            let (lower, upper) = (splines::<REACH>(t - 1e-5)[0], splines::<REACH>(t + 1e-5)[0]);
+            let (lower, upper) = (splines(t - 1e-5)[0], splines(t + 1e-5)[0]);
             for k in 0..6 {
                 assert!(((upper[k] - lower[k]) / 2e-5 - slope[k]).abs() < 1e-9);
             }
         }
         // One spline from cell to cell, up to its last continuous derivative, by differences.
         for k in 1..2 * REACH {
-            let (before, after) = (splines::<REACH>(1.0), splines::<REACH>(0.0));
+            let (before, after) = (splines(1.0), splines(0.0));
             assert!((before[0][k] - after[0][k - 1]).abs() < 1e-15 && (before[1][k] - after[1][k - 1]).abs() < 1e-15);
         }
     }
