@@ -174,3 +174,26 @@ fn cli_an_interrupted_run_leaves_what_was_there_and_nothing_else() {
     println!("{stopped} runs were stopped");
     assert!(stopped >= SURE, "only {stopped} runs were stopped in time");
 }
+
+/// A limit of the size of files stands for a full disk: writing fails in the same way, at another size of each file.
+#[test]
+fn cli_a_full_disk_ends_in_one_message() {
+    let runs = Runs::new();
+    let out = runs.scratch.at("first");
+    let mut sizes: Vec<usize> = runs.second.values().map(Vec::len).collect();
+    sizes.sort_unstable();
+    // Room for almost nothing, for half of the files and for all but the largest, in blocks of 512 bytes.
+    for room in [1, sizes[sizes.len() / 2] / 512, sizes[sizes.len() - 1] / 512 - 1] {
+        let program = command(Path::new(&out), &[]).get_program().to_owned();
+        let limited = format!("trap '' XFSZ; ulimit -f {room}; exec \"$@\"");
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &limited, "sh"]).arg(program);
+        let output = shell.args(["run", &tiny(), "-o", &out, "--fresh", "--set", CHANGE]).output().unwrap();
+        let words = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{room} blocks: {words}");
+        assert_eq!(words.matches("error:").count(), 1, "{room} blocks: {words}");
+        assert!(words.contains("cannot be written") && words.contains("make room on the disk"), "{words}");
+        let found = contents(Path::new(&out));
+        assert_eq!(found, runs.first, "{room} blocks: files of before were touched or new ones left over");
+    }
+}
