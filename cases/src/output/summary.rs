@@ -7,6 +7,7 @@ use serde::Serialize;
 use tracer::{Ensemble, Outcome, Region};
 
 use crate::case::{Case, Drive, GROUND};
+use crate::pipeline::analysis::brief::Brief;
 use crate::pipeline::flights::Flights;
 use crate::pipeline::memory::people;
 use crate::pipeline::solution::Solution;
@@ -33,6 +34,9 @@ pub struct Summary {
     /// The flights.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trace: Option<TraceSummary>,
+    /// The trap that each group of grains is in, where that is known for little.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub traps: Vec<Brief>,
     /// Time that each stage took.
     pub seconds: Seconds,
     /// Most memory that was used, bytes; 0 where the system does not tell.
@@ -437,6 +441,9 @@ impl Summary {
                 );
             }
         }
+        for trap in &self.traps {
+            trap_lines(trap).into_iter().for_each(|(key, words)| line(key, words));
+        }
         let s = &self.seconds;
         let mut parts = vec![format!("mesh {:.2} s, solve {:.2} s", s.mesh, s.solve)];
         parts.extend(s.table.map(|t| format!("table {t:.2} s")));
@@ -453,6 +460,21 @@ impl Summary {
         }
         text
     }
+}
+
+/// A trap in lines for people.
+fn trap_lines(trap: &Brief) -> Vec<(&'static str, String)> {
+    let list = |numbers: &[f64]| numbers.iter().map(|x| format!("{x:.5}")).collect::<Vec<_>>().join(", ");
+    // Rounding of a centre is no place.
+    let [x, y, z] = trap.center.map(|x| metres(if x.abs() < 1e-12 { 0.0 } else { x }));
+    let mut lines = vec![("trap", format!("grains {}: {} at ({x}, {y}, {z})", trap.grains, trap.kind))];
+    if let Some(m) = &trap.mathieu {
+        lines.push(("", format!("a {}; q {}; each within {:.0e}", list(&m.a), list(&m.q), m.error_estimate)));
+    }
+    let swings: Vec<String> = trap.secular_hz.iter().map(|f| format!("{f:.5}")).collect();
+    let held = if trap.held { "held" } else { "not held in all directions" };
+    lines.push(("", format!("{held}; secular frequencies {} Hz within {:.0e}", swings.join(", "), trap.secular_error)));
+    lines
 }
 
 fn ending(end: &Final) -> String {

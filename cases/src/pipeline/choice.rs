@@ -134,6 +134,29 @@ pub fn choose(case: &Case, source: &CaseSource) -> Result<Choice, Failure> {
     Ok(choice)
 }
 
+/// What solves for electrodes that touch or cut each other where curved elements would be chosen: charge grows without bound where
+/// smooth surfaces meet, in the midst of elements, and no refinement of these comes to an end.
+///
+/// # Errors
+/// The case insists on curved elements.
+pub fn of_joined(case: &Case, source: &CaseSource, [one, other]: [&str; 2]) -> Result<Choice, Failure> {
+    let key = if case.field.method == Method::Curved { "field.method" } else { "field.solver" };
+    let solver = match (case.field.method, case.field.solver) {
+        (Method::Auto, Asked::Auto | Asked::Dense) => Solver::Dense,
+        (Method::Auto, Asked::Symmetric) => Solver::Symmetric,
+        (Method::Auto, Asked::Multipole) => Solver::Multipole,
+        _ => {
+            let problem =
+                format!("`{one}` and `{other}` touch or cut each other, and curved elements must stand apart");
+            return Err(source.error_at(key, problem, "leave it out, or move them apart").into());
+        }
+    };
+    let choice =
+        Choice { solver, elements: Elements::Galerkin, why: format!("`{one}` and `{other}` touch or cut each other") };
+    connected(&choice, source)?;
+    Ok(choice)
+}
+
 /// An electrode of which only triangles are known.
 fn flat_only(case: &Case) -> Option<&str> {
     let smooth =

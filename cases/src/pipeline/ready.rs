@@ -4,7 +4,7 @@ use field::{ElectrodeBasis, PotentialTable, Source};
 use meshes::{SurfaceMesh, SurfaceTree, Vec3};
 use tracer::{Ensemble, Region};
 
-use super::choice::{Choice, Elements, choose};
+use super::choice::{Choice, Elements, choose, of_joined};
 use super::surface::{Electrodes, check_contacts, check_ground};
 use super::{Failure, Reporter, drives, flights, memory, region};
 use crate::CaseSource;
@@ -32,14 +32,17 @@ pub struct Ready {
 /// a table that fits in no memory.
 pub fn ready(case: &Case, source: &CaseSource, reporter: &dyn Reporter) -> Result<Ready, Failure> {
     reporter.stage("mesh");
-    let choice = choose(case, source)?;
+    let mut choice = choose(case, source)?;
     let sources = drives::sources(case, source)?;
     let mut electrodes = Electrodes::new(case, source, reporter)?;
     let mesh = electrodes.mesh(case, source, 1.0, 1.0)?;
     check_ground(&mesh, case, source)?;
     let curved = choice.elements == Elements::Curved;
-    check_contacts(&electrodes, curved, &mesh, case, source, reporter)?;
-    if !curved {
+    let joined = check_contacts(&electrodes, curved, &mesh, case, source, reporter)?;
+    if let Some(names) = joined.filter(|_| curved) {
+        choice = of_joined(case, source, names)?;
+    }
+    if choice.elements != Elements::Curved {
         electrodes.emphasise_gaps(case, &mesh, reporter);
     }
     check_table(case, source, &mesh, &sources)?;

@@ -240,19 +240,20 @@ pub fn check_ground(mesh: &SurfaceMesh, case: &Case, source: &CaseSource) -> Res
 
 /// Refuses electrodes that touch or cut each other at different voltages. Facets keep the area of round surfaces and stand out
 /// of them here and there: with `curved`, where charges do not sit on facets, those that seem to touch are looked at more
-/// finely.
+/// finely. Gives the names of the first two that touch at one voltage.
 ///
 /// # Errors
 /// Names both and where they meet.
-pub fn check_contacts(
+pub fn check_contacts<'a>(
     electrodes: &Electrodes,
     curved: bool,
     mesh: &SurfaceMesh,
-    case: &Case,
+    case: &'a Case,
     source: &CaseSource,
     reporter: &dyn Reporter,
-) -> Result<(), Failure> {
-    let Some((lo, hi)) = mesh.bounds() else { return Ok(()) };
+) -> Result<Option<[&'a str; 2]>, Failure> {
+    let Some((lo, hi)) = mesh.bounds() else { return Ok(None) };
+    let mut joined = None;
     let touch = TOUCH * (hi - lo).norm();
     let trees: Vec<SurfaceTree> = (0..case.electrodes.len()).map(|e| SurfaceTree::of_electrode(mesh, e)).collect();
     for i in 0..trees.len() {
@@ -274,6 +275,7 @@ pub fn check_contacts(
                     "`{}` and `{}` touch {place}; they have one voltage, but their separate capacitances depend on the mesh",
                     a.name, b.name
                 ));
+                joined.get_or_insert([a.name.as_str(), b.name.as_str()]);
                 continue;
             }
             let floats = [a, b].iter().any(|e| matches!(e.drive, Drive::Charge(_)));
@@ -285,5 +287,5 @@ pub fn check_contacts(
             return Err(source.error_at(&format!("electrode.{}.center", b.name), problem, help).into());
         }
     }
-    Ok(())
+    Ok(joined)
 }

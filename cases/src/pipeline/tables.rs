@@ -68,8 +68,15 @@ impl Plan {
 }
 
 fn too_large(case: &Case, source: &CaseSource, error: TableError) -> Failure {
-    let TableError::TooLarge { nodes, functions, needed, available, spacing_that_fits } = error;
-    table_too_large(case, source, nodes, functions, needed, available, spacing_that_fits)
+    match error {
+        TableError::TooLarge { nodes, functions, needed, available, spacing_that_fits } => {
+            table_too_large(case, source, nodes, functions, needed, available, spacing_that_fits)
+        }
+        TableError::TooFine { spacing_that_fits, .. } => {
+            let help = format!("make it at least {spacing_that_fits:.2e} m, or the box shorter (table.min, table.max)");
+            source.error_at("table.spacing", error.to_string(), help).into()
+        }
+    }
 }
 
 /// Tabulates the unit potentials of a case.

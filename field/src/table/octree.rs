@@ -11,6 +11,9 @@ use super::grid::Grid;
 /// Times that a brick may be halved.
 pub(super) const MAX_LEVEL: u8 = 12;
 
+/// Fewer coarsest bricks than this are along each axis, so that the places of the smallest ones can be counted.
+pub(super) const MOST_BRICKS: usize = 1 << (31 - MAX_LEVEL);
+
 /// Stands for no brick, no node, no numbers.
 pub(super) const NONE: u32 = u32::MAX;
 
@@ -183,7 +186,7 @@ impl Octree {
 
     /// Whether places, parts and corners are what they should be for so many nodes; a tree that was read from somewhere may lie.
     pub(super) fn is_whole(&self, nodes: usize) -> bool {
-        let sensible = self.grid.cells.iter().all(|n| *n > 0 && *n < 1 << (31 - MAX_LEVEL));
+        let sensible = self.grid.cells.iter().all(|n| *n > 0 && *n < MOST_BRICKS);
         let roots = self.grid.cells.iter().try_fold(1_usize, |product, n| product.checked_mul(*n));
         let good = |(number, brick): (usize, &Brick)| {
             let parts = brick.parts as usize;

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::fill::fill;
 use super::measure::{TableReport, measure};
-use super::octree::{Brick, MAX_LEVEL, NONE, Octree};
+use super::octree::{Brick, MAX_LEVEL, MOST_BRICKS, NONE, Octree};
 use super::refine::{Quality, quality, rescale};
 use super::spline::Splines;
 use super::{CELLS_PER_BRICK, Grid, PER_NODE, PotentialTable, reach_for};
@@ -50,6 +50,16 @@ pub enum TableError {
         /// Bytes.
         available: u64,
         /// Largest spacing that would fit, m.
+        spacing_that_fits: f64,
+    },
+    /// The box is too long for its cells.
+    #[error("a table has fewer than {most} cells along each axis, and this one would have {cells}")]
+    TooFine {
+        /// Cells along the longest edge.
+        cells: u64,
+        /// There must be fewer.
+        most: u64,
+        /// Smallest spacing that would do, m.
         spacing_that_fits: f64,
     },
 }
@@ -126,6 +136,12 @@ pub fn tabulate_around(
             available: options.max_bytes,
             spacing_that_fits: fits,
         });
+    }
+    let most = grid.cells.iter().copied().max().unwrap_or(0);
+    if most >= MOST_BRICKS {
+        let cells = |bricks: usize| (bricks * CELLS_PER_BRICK) as u64;
+        let fits = 1.01 * longest / cells(MOST_BRICKS) as f64;
+        return Err(TableError::TooFine { cells: cells(most), most: cells(MOST_BRICKS), spacing_that_fits: fits });
     }
     let mut maker = Maker {
         basis,

@@ -171,3 +171,15 @@ fn points_outside_are_left() {
     kernel.channels_at(&points, &mut potential, &mut gradient, &mut left);
     assert_eq!(left, [1, 2]);
 }
+
+#[test]
+fn a_box_too_long_for_its_cells_is_refused() {
+    let ball = meshes::triangulate_to(&meshes::Shape::Sphere { radius: 1.0 }, 80).unwrap().0;
+    let basis =
+        crate::BoundaryProblem::new(&meshes::SurfaceMesh::assemble([("ball".to_owned(), ball)])).solve().unwrap();
+    let (min, max) = (Vec3::new(2.0, -1e-6, -1e-6), Vec3::new(12.0, 1e-6, 1e-6));
+    let options = TableOptions { min, max, accuracy: 1e-3, spacing: Some(1e-6), max_bytes: u64::MAX };
+    let refused = tabulate(&basis, &options, &|_| ()).unwrap_err();
+    let TableError::TooFine { cells, most, spacing_that_fits } = refused else { panic!("{refused}") };
+    assert!(cells > most && (10.0 / spacing_that_fits) < most as f64, "{refused}");
+}

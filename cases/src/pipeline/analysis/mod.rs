@@ -1,5 +1,6 @@
 //! What a case is like as a trap: null points, multipoles, and for each group of grains its equilibrium, frequencies and depth.
 
+pub mod brief;
 pub mod chart;
 pub mod report;
 mod species;

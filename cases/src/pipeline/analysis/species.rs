@@ -72,7 +72,7 @@ pub(super) fn species(
     let frequency = ground.tones.strongest();
     let principal = principal(&here.hessian);
     if let Some(frequency) = frequency {
-        let mathieu = mathieu(ground, &expansion, &center, principal.1, specific, rate, frequency);
+        let mathieu = mathieu(&ground.tones, space.error, &expansion, &center, principal.1, specific, rate, frequency);
         report.adiabaticity = Some(mathieu.q.iter().fold(0.0, |m: f64, q| m.max(q.abs())));
         report.mathieu = Some(mathieu);
     }
@@ -195,8 +195,10 @@ pub(super) fn parameters([statics, cosine, sine]: &[Matrix3<f64>; 3], axes: &[Ve
     ([0, 1, 2].map(|k| along(statics, &axes[k])), [0, 1, 2].map(|k| q(&axes[k])))
 }
 
-fn mathieu(
-    ground: &Ground,
+#[allow(clippy::too_many_arguments)]
+pub(super) fn mathieu(
+    tones: &Tones,
+    field_error: f64,
     expansion: &Expansion,
     center: &Vec3,
     axes: [Vec3; 3],
@@ -207,8 +209,8 @@ fn mathieu(
     let jets = expansion.jets(center);
     let omega = TAU * frequency;
     let scale = 4.0 * specific / (omega * omega);
-    let tone = ground.tones.tones.iter().find(|t| t.frequency == frequency);
-    let bends = bends(&ground.tones, &jets, specific, frequency);
+    let tone = tones.tones.iter().find(|t| t.frequency == frequency);
+    let bends = bends(tones, &jets, specific, frequency);
     let [statics, cosine, sine] = bends;
     let along = |m: &Matrix3<f64>, i: usize, j: usize| axes[i].dot(&(m * axes[j]));
     let (a, q) = parameters(&bends, &axes);
@@ -221,7 +223,7 @@ fn mathieu(
     // What each channel's error does, at its own voltage.
     let size = |weights: &[f64]| jets.iter().zip(weights).map(|(j, w)| (j.hessian.norm() * w).abs()).sum::<f64>();
     let rf = tone.map_or(0.0, |t| size(&t.cosine).hypot(size(&t.sine)));
-    let error = ground.space.error * scale.abs() * size(&ground.tones.constant).max(0.5 * rf);
+    let error = field_error * scale.abs() * size(&tones.constant).max(0.5 * rf);
     MathieuReport {
         axes: axes.map(Into::into),
         a,
@@ -237,7 +239,7 @@ fn mathieu(
 }
 
 /// The modes of the motion in the order of the principal axes.
-fn in_order(modes: &[Mode], axes: &[Vec3; 3]) -> Vec<Mode> {
+pub(super) fn in_order(modes: &[Mode], axes: &[Vec3; 3]) -> Vec<Mode> {
     let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
     let overlap = |order: &[usize; 3]| -> f64 {
         order.iter().zip(axes).map(|(k, axis)| modes.get(*k).map_or(0.0, |mode| mode.axis.dot(axis).powi(2))).sum()
