@@ -73,7 +73,9 @@ class Browser:
             "goog:chromeOptions": options,
             "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"},
         }
+        # The page that a browser begins with asks for much of its own.
         self.session = "/session/" + self.ask("POST", "/session", {"capabilities": {"alwaysMatch": wanted}})["sessionId"]
+        self.ask("POST", self.session + "/url", {"url": "about:blank"})
 
     def ask(self, method, path, body=None):
         data = None if body is None else json.dumps(body).encode()
@@ -208,7 +210,7 @@ def look(browser, page, checks, pictures):
     checks.that(name, "no errors", errors == [], "; ".join(errors))
     sent = [json.loads(entry["message"])["message"] for entry in browser.log("performance")]
     asked = [m["params"]["request"]["url"] for m in sent if m["method"] == "Network.requestWillBeSent"]
-    outside = [url[:100] for url in asked if not url.startswith(("file:", "data:", "blob:"))]
+    outside = [url[:100] for url in asked if not url.startswith(("file:", "data:", "blob:", "chrome:"))]
     checks.that(name, "asks the network for nothing", outside == [], "; ".join(outside))
 
 

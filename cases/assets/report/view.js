@@ -57,8 +57,9 @@
   camera.up.set(0, 0, 1);
   const orbit = new THREE.OrbitControls(camera, canvas);
   orbit.enableDamping = false;
-  world.add(new THREE.AmbientLight(0xffffff, 1.9));
-  const lamp = new THREE.DirectionalLight(0xffffff, 1.5);
+  // Together they give a face that looks at the viewer the colour of the bar.
+  world.add(new THREE.AmbientLight(0xffffff, 0.55 * Math.PI));
+  const lamp = new THREE.DirectionalLight(0xffffff, 0.5 * Math.PI);
   camera.add(lamp);
   lamp.position.set(-0.6, 0.9, 1);
   world.add(camera);
@@ -66,43 +67,45 @@
   let asked = false;
   const draw = () => { if (!asked) { asked = true; requestAnimationFrame(() => { asked = false; render(); }); } };
 
-  // ---- Electrodes: each triangle has one density, hence corners of its own.
+  // ---- Electrodes: each triangle has corners of its own, whose colours and normals are means over the faces around them that bend
+  // little from it, so that round electrodes look round and edges stay sharp.
   const plane = new THREE.Plane(new THREE.Vector3(-1, 0, 0), 0);
   const vertices = floats(scene.vertices), triangles = whole(scene.triangles);
-  // Corners at one place whose faces bend little share a normal, so that round electrodes look round.
-  const shadingNormals = () => {
-    const count = triangles.length / 3, faces = new Float32Array(3 * count), around = new Map();
-    const key = (v) => `${Math.round(vertices[3 * v] * 1e6)},${Math.round(vertices[3 * v + 1] * 1e6)},${Math.round(vertices[3 * v + 2] * 1e6)}`;
-    const spot = new Int32Array(vertices.length / 3), lists = [];
-    for (let v = 0; v < spot.length; v++) {
-      const k = key(v);
-      let n = around.get(k);
-      if (n === undefined) { n = lists.length; lists.push([]); around.set(k, n); }
-      spot[v] = n;
+  const around = () => {
+    const count = triangles.length / 3, faces = new Float32Array(3 * count), sizes = new Float32Array(count), known = new Map();
+    const spots = new Int32Array(vertices.length / 3), lists = [];
+    for (let v = 0; v < spots.length; v++) {
+      const key = [0, 1, 2].map((k) => Math.round(vertices[3 * v + k] * 1e6)).join();
+      let n = known.get(key);
+      if (n === undefined) { n = lists.length; lists.push([]); known.set(key, n); }
+      spots[v] = n;
     }
     const [a, b, c] = [new THREE.Vector3(), new THREE.Vector3(), new THREE.Vector3()];
     for (let t = 0; t < count; t++) {
       [a, b, c].forEach((p, k) => p.fromArray(vertices, 3 * triangles[3 * t + k]));
       b.sub(a).cross(c.sub(a)).toArray(faces, 3 * t);
-      for (let k = 0; k < 3; k++) lists[spot[triangles[3 * t + k]]].push(t);
+      sizes[t] = b.length() || 1e-30;
+      for (let k = 0; k < 3; k++) lists[spots[triangles[3 * t + k]]].push(t);
     }
-    const normals = new Float32Array(9 * count), size = (t) => Math.hypot(faces[3 * t], faces[3 * t + 1], faces[3 * t + 2]) || 1;
-    for (let t = 0; t < count; t++) {
-      for (let k = 0; k < 3; k++) {
-        let [x, y, z] = [0, 0, 0];
-        for (const u of lists[spot[triangles[3 * t + k]]]) {
-          const dot = faces[3 * t] * faces[3 * u] + faces[3 * t + 1] * faces[3 * u + 1] + faces[3 * t + 2] * faces[3 * u + 2];
-          if (dot > 0.7 * size(t) * size(u)) { x += faces[3 * u]; y += faces[3 * u + 1]; z += faces[3 * u + 2]; }
-        }
-        const length = Math.hypot(x, y, z) || 1;
-        normals.set([x / length, y / length, z / length], 9 * t + 3 * k);
+    const near = (t, corner, what) => {
+      for (const u of lists[spots[triangles[3 * t + corner]]]) {
+        const dot = faces[3 * t] * faces[3 * u] + faces[3 * t + 1] * faces[3 * u + 1] + faces[3 * t + 2] * faces[3 * u + 2];
+        if (dot > 0.7 * sizes[t] * sizes[u]) what(u);
       }
-    }
-    return normals;
+    };
+    return { faces, sizes, near };
   };
   const parts = [];
+  let mesh = null;
   if (triangles.length) {
-    const normals = shadingNormals();
+    const { faces, near } = (mesh = around());
+    const normals = new Float32Array(3 * triangles.length);
+    for (let corner = 0; corner < triangles.length; corner++) {
+      const sum = [0, 0, 0];
+      near(Math.floor(corner / 3), corner % 3, (u) => { for (let k = 0; k < 3; k++) sum[k] += faces[3 * u + k]; });
+      const length = Math.hypot(...sum) || 1;
+      normals.set(sum.map((x) => x / length), 3 * corner);
+    }
     for (const electrode of scene.electrodes) {
       const geometry = new THREE.BufferGeometry(), n = 3 * electrode.count;
       const position = new Float32Array(3 * n);
@@ -113,10 +116,10 @@
       geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
       geometry.setAttribute("normal", new THREE.BufferAttribute(normals.subarray(9 * electrode.first, 9 * electrode.first + 3 * n), 3));
       geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(3 * n), 3));
-      const material = new THREE.MeshPhongMaterial({ vertexColors: true, side: THREE.DoubleSide, shininess: 12, specular: 0x181818, transparent: true });
-      const mesh = new THREE.Mesh(geometry, material);
-      world.add(mesh);
-      parts.push(mesh);
+      const material = new THREE.MeshPhongMaterial({ vertexColors: true, side: THREE.DoubleSide, shininess: 10, specular: 0x0a0a0a, transparent: true });
+      const part = new THREE.Mesh(geometry, material);
+      world.add(part);
+      parts.push(part);
     }
   }
   // A few panels at edges carry ten times the density of all others: the bar ends where all but one in fifty are.
@@ -124,8 +127,8 @@
     const density = scene.densities[number], bar = $("colours");
     bar.replaceChildren();
     if (!density) {
-      parts.forEach((mesh, e) => {
-        const [r, g, b] = rgb(PARTS[e % PARTS.length]), colours = mesh.geometry.attributes.color;
+      parts.forEach((part, e) => {
+        const [r, g, b] = rgb(PARTS[e % PARTS.length]), colours = part.geometry.attributes.color;
         for (let k = 0; k < colours.count; k++) colours.setXYZ(k, r, g, b);
         colours.needsUpdate = true;
       });
@@ -138,11 +141,14 @@
     if (both) { high = Math.max(-low, high); low = -high; } else if (high > 0 && low > 0 && low < 0.5 * high) { low = 0; } else if (low < 0 && high < 0 && high > 0.5 * low) { high = 0; }
     const map = ramp(both ? BOTH : ONE_SIGN), span = high - low || 1;
     const of = (x) => map((x - low) / span);
-    parts.forEach((mesh, e) => {
-      const { first, count } = scene.electrodes[e], colours = mesh.geometry.attributes.color;
-      for (let t = 0; t < count; t++) {
-        const [r, g, b] = of(values[first + t]);
-        for (let k = 0; k < 3; k++) colours.setXYZ(3 * t + k, r, g, b);
+    parts.forEach((part, e) => {
+      const { first, count } = scene.electrodes[e], colours = part.geometry.attributes.color;
+      for (let t = first; t < first + count; t++) {
+        for (let k = 0; k < 3; k++) {
+          let [charge, area] = [0, 0];
+          mesh.near(t, k, (u) => { charge += values[u] * mesh.sizes[u]; area += mesh.sizes[u]; });
+          colours.setXYZ(3 * (t - first) + k, ...of(area > 0 ? charge / area : values[t]));
+        }
       }
       colours.needsUpdate = true;
     });
@@ -292,17 +298,22 @@
 
   // ---- Null points and minima of an analysis.
   const tags = [];
-  for (const mark of scene.marks) {
-    const known = tags.find((tag) => tag.at.distanceTo(new THREE.Vector3(...mark.position)) < 1e-3);
-    if (known) { if (!known.names.includes(mark.name)) known.names.push(mark.name); continue; }
-    tags.push({ at: new THREE.Vector3(...mark.position), names: [mark.name] });
+  for (const { kind, of, position } of scene.marks) {
+    const at = new THREE.Vector3(...position);
+    let tag = tags.find((other) => other.at.distanceTo(at) < 1e-3);
+    if (!tag) { tag = { at, of: { null: [], minimum: [] } }; tags.push(tag); }
+    if (!tag.of[kind].includes(of)) tag.of[kind].push(of);
+  }
+  for (const tag of tags) {
+    const words = Object.entries(tag.of).filter(([, of]) => of.length).map(([kind, of]) => `${kind} ${kind === "null" ? "of" : "for"} ${of.join(", ")}`);
+    tag.text = words.join("; ");
   }
 
   // ---- The box with its axes.
   const metres = (k, x) => scene.center[k] + scene.size * x;
   const box = { low: new THREE.Vector3(...scene.low), high: new THREE.Vector3(...scene.high) };
   const diagonal = box.high.distanceTo(box.low);
-  const margin = 0.06 * diagonal;
+  const margin = 0.035 * diagonal;
   const frame = { low: box.low.clone().subScalar(margin), high: box.high.clone().addScalar(margin) };
   const ink = new THREE.LineBasicMaterial({ transparent: true, opacity: 0.55 });
   const lines = new THREE.LineSegments(new THREE.BufferGeometry(), ink);
@@ -384,7 +395,7 @@
 
   const render = () => {
     const shown = axes();
-    for (const tag of tags) shown.push({ text: tag.names.join(", "), className: "mark", at: tag.at });
+    for (const tag of tags) shown.push({ text: tag.text, className: "mark", at: tag.at });
     shown.forEach((label, number) => place(number, label));
     for (let k = shown.length; k < spans.length; k++) spans[k].hidden = true;
     renderer.render(world, camera);
@@ -394,15 +405,26 @@
   const target = new THREE.Vector3();
   const look = (direction, low, high) => {
     target.addVectors(low, high).multiplyScalar(0.5);
-    const radius = Math.max(1e-4, 0.5 * high.distanceTo(low));
-    const half = (camera.fov * Math.PI) / 360, aspect = Math.min(1, camera.aspect * 0.92);
-    // Corners of a box of this radius seen from this side fit, with room for the axes.
-    const distance = (0.93 * radius) / Math.sin(half) / aspect;
+    const arm = direction.clone().normalize();
     orbit.target.copy(target);
-    camera.position.copy(target).addScaledVector(direction.normalize(), distance);
-    camera.near = Math.max(distance / 100, 1e-5);
-    camera.far = distance + 20;
-    camera.updateProjectionMatrix();
+    // As near as leaves all corners on the screen, with room for numbers and for the bar of colours.
+    let distance = Math.max(1e-4, 0.5 * high.distanceTo(low));
+    for (let tries = 0; tries < 60; tries++) {
+      camera.position.copy(target).addScaledVector(arm, distance);
+      camera.lookAt(target);
+      camera.near = distance / 100;
+      camera.far = distance + 20;
+      camera.updateProjectionMatrix();
+      camera.updateMatrixWorld();
+      let most = 0;
+      for (let corner = 0; corner < 8; corner++) {
+        const at = new THREE.Vector3(...[0, 1, 2].map((k) => (corner >> k & 1 ? high : low).getComponent(k)));
+        const behind = at.clone().sub(camera.position).dot(arm) > -1e-6, seen = at.project(camera);
+        most = behind ? Infinity : Math.max(most, Math.abs(seen.x) / 0.82, Math.abs(seen.y) / 0.92);
+      }
+      if (most <= 1) break;
+      distance *= 1.06;
+    }
     orbit.update();
     draw();
   };
@@ -468,7 +490,7 @@
       material.clippingPlanes = cut ? [plane] : [];
       material.needsUpdate = true;
     }
-    parts.forEach((mesh, e) => { mesh.visible = opacity > 0 && list.querySelectorAll("input")[e].checked; });
+    parts.forEach((part, e) => { part.visible = opacity > 0 && list.querySelectorAll("input")[e].checked; });
     draw();
   };
   $("opacity").addEventListener("input", dress);
@@ -493,7 +515,7 @@
   };
   new ResizeObserver(fit).observe(stage);
   // Where grains fly inside of what surrounds them, one must see through it.
-  $("opacity").value = flown || tags.length ? 0.6 : 1;
+  $("opacity").value = flown || tags.length ? 0.7 : 1;
   colour(0);
   dress();
   fit();

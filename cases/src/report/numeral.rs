@@ -31,7 +31,7 @@ impl Cell {
     pub fn rounded(self) -> Self {
         let (number, unit) = self.text.split_once('\u{a0}').unwrap_or((&self.text, ""));
         let text = match number.parse::<f64>() {
-            Ok(x) => format!("{}\u{a0}{unit}", decimal(x, decimals(x, 1))),
+            Ok(x) => format!("{}\u{a0}{unit}", decimal(x, 1)),
             Err(_) => self.text.clone(),
         };
         Self { text, ..self }
@@ -42,19 +42,6 @@ impl Cell {
         let (number, rest) = self.text.split_once(" ± ").unwrap_or((&self.text, ""));
         let unit = rest.split_once('\u{a0}').map_or(String::new(), |(_, unit)| format!("\u{a0}{unit}"));
         Self { text: format!("{number}{unit}"), ..self }
-    }
-
-    /// Without zeros at its end, where no error says how many digits it has.
-    pub fn trimmed(self) -> Self {
-        if !self.text.contains('.') || self.text.contains(['±', '·']) {
-            return self;
-        }
-        Self { text: self.text.trim_end_matches('0').trim_end_matches('.').to_owned(), ..self }
-    }
-
-    /// Whether it stands to the right.
-    pub fn is_number(&self) -> bool {
-        self.value.is_some()
     }
 }
 
@@ -89,7 +76,7 @@ pub fn rough(value: f64) -> Cell {
     let text = if value != 0.0 && (value.abs() < 1e-2 || value.abs() >= 1e4) {
         power(value, 0)
     } else {
-        decimal(value, decimals(value, 1))
+        decimal(value, 1)
     };
     Cell { text, value: Some(exact(value)) }
 }
@@ -119,11 +106,18 @@ fn with_error(value: f64, error: Option<f64>) -> String {
             // As many decimals as the error has with one digit, of all digits at most so many.
             let shown = (-exponent(error) + exponent(size) + 1).clamp(1, MOST);
             let number = if value == 0.0 { "0".to_owned() } else { significant(value, shown - exponent(size) + exponent(value)) };
-            let error = if (1e-3..1e4).contains(&error) { decimal(error, decimals(error, 1)) } else { power(error, 0) };
+            let error = if (1e-3..1e4).contains(&error) { decimal(error, 1) } else { power(error, 0) };
             format!("{number} ± {error}")
         }
-        _ => significant(value, DIGITS),
+        _ => trimmed(&significant(value, DIGITS)),
     }
+}
+
+/// Without zeros at the end of its decimals, which no error asks for.
+fn trimmed(text: &str) -> String {
+    let (mantissa, power) = text.split_at(text.find('·').unwrap_or(text.len()));
+    let mantissa = if mantissa.contains('.') { mantissa.trim_end_matches('0').trim_end_matches('.') } else { mantissa };
+    format!("{mantissa}{power}")
 }
 
 /// With so many digits; powers of ten where it is very large or small.
@@ -133,15 +127,9 @@ fn significant(value: f64, digits: i32) -> String {
         return "0".to_owned();
     }
     if (1e-3..1e6).contains(&value.abs()) {
-        let places = decimals(value, digits);
-        return decimal(value, places);
+        return decimal(value, digits);
     }
     power(value, digits - 1)
-}
-
-/// Decimals that show so many digits.
-fn decimals(value: f64, digits: i32) -> usize {
-    (digits - 1 - exponent(value)).max(0) as usize
 }
 
 /// Of ten; 0 for zero.
@@ -149,8 +137,12 @@ fn exponent(value: f64) -> i32 {
     if value == 0.0 || !value.is_finite() { 0 } else { value.abs().log10().floor() as i32 }
 }
 
-fn decimal(value: f64, decimals: usize) -> String {
-    format!("{value:.decimals$}").replace('-', "\u{2212}")
+/// So many digits without a power of ten: zeros stand for those before the point that are not shown.
+fn decimal(value: f64, digits: i32) -> String {
+    let decimals = digits - 1 - exponent(value);
+    let step = 10_f64.powi(-decimals);
+    let rounded = if decimals < 0 { (value / step).round() * step } else { value };
+    format!("{rounded:.*}", decimals.max(0) as usize).replace('-', "\u{2212}")
 }
 
 /// `1.5·10⁻⁷`.
@@ -191,8 +183,12 @@ mod tests {
         assert_eq!(text(1.0, Some(3.0), ""), "1 ± 3");
         assert_eq!(text(0.0, Some(1e-9), "m"), "0 ± 1 nm");
         assert_eq!(text(1.0 / 3.0, Some(1e-300), ""), "0.3333333333 ± 1·10⁻³⁰⁰");
-        assert_eq!(text(2.5e-3, None, "V/m²"), "0.00250000 V/m²");
-        assert_eq!(text(2.5e-7, None, "V/m²"), "2.50000·10⁻⁷ V/m²");
+        assert_eq!(text(0.2891, Some(0.0101), "Hz"), "290 ± 10 mHz");
+        assert_eq!(text(2.5e-3, None, "V/m²"), "0.0025 V/m²");
+        assert_eq!(text(2.5e-7, None, "V/m²"), "2.5·10⁻⁷ V/m²");
+        assert_eq!(text(100.0, None, "V"), "100 V");
+        assert_eq!(number(743.2e-9, None, "m").rounded().text, "700\u{a0}nm");
+        assert_eq!(number(1.5, Some(0.1), "Hz").short().text, "1.5\u{a0}Hz");
         assert_eq!(number(0.1 + 0.2, None, "").value.as_deref(), Some("0.30000000000000004"));
     }
 

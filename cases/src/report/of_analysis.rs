@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::numeral::{Cell, bare, number, place, rough};
 use super::table::{Key, Section, Table};
 
-/// Degrees of multipoles that are shown.
+/// Multipoles that are shown, from A_0 on.
 const DEGREES: usize = 9;
 /// Null points, critical points and electrodes that are shown of each kind.
 const LISTED: usize = 20;
@@ -14,11 +14,15 @@ const ALL: &str = "More are in analysis.json.";
 /// What people look for first: of the first group of grains.
 pub fn keys(analysis: &Value) -> Vec<Key> {
     let mut keys = Vec::new();
-    let mut put = |name: String, cell: Cell| keys.push(Key { name, cell });
+    let mut put = |name: &str, value: f64, error: Option<f64>, unit: &str| {
+        // Six digits at most: this is a glance.
+        let error = error.map(|error| error.max(1e-6 * value.abs()));
+        keys.push(Key { name: name.to_owned(), cell: number(value, error, unit).short() });
+    };
     let mathieu = &analysis["mathieu"];
     let largest = list(&mathieu["q"]).into_iter().max_by(|a, b| a.abs().total_cmp(&b.abs()));
     if let Some(q) = largest {
-        put("largest q of Mathieu's equation".to_owned(), number(q, mathieu["error_estimate"].as_f64(), "").short());
+        put("largest q of Mathieu's equation", q, mathieu["error_estimate"].as_f64(), "");
     }
     let modes = analysis["secular_hz"]["modes"].as_array().map(Vec::as_slice).unwrap_or_default();
     if let (Some(low), Some(high)) = (modes.last(), modes.first())
@@ -26,12 +30,12 @@ pub fn keys(analysis: &Value) -> Vec<Key> {
     {
         for (name, mode) in [("lowest secular frequency", low), ("highest secular frequency", high)] {
             if let Some(f) = mode["transition"].as_f64() {
-                put(name.to_owned(), number(f, mode["transition_error"].as_f64(), "Hz").short());
+                put(name, f, mode["transition_error"].as_f64(), "Hz");
             }
         }
     }
     if let Some(volts) = analysis["depth_ev"]["volts"].as_f64() {
-        put("depth of the well".to_owned(), number(volts, None, "V").short());
+        put("depth of the well", volts, None, "V");
     }
     keys
 }
@@ -114,21 +118,19 @@ fn multipoles(analysis: &Value) -> Table {
         .chain(of("driven").into_iter().map(|unit| (unit, ", driven")))
         .collect();
     let degrees = rows.iter().map(|(unit, _)| list(&unit["A"]).len()).max().unwrap_or(0).min(DEGREES);
-    table.head = std::iter::once("potential".to_owned()).chain((0..degrees).map(|l| format!("A{l}"))).collect();
-    for (unit, what) in rows {
-        let name = Cell::words(format!("{}{what}", unit["name"].as_str().unwrap_or_default()));
-        let errors = list(&unit["error_estimate"]);
-        let cells = list(&unit["A"]).into_iter().zip(errors).take(degrees);
+    let name = |(unit, what): &(Value, &str)| format!("{}{what}", unit["name"].as_str().unwrap_or_default());
+    table.head = std::iter::once("l".to_owned()).chain(rows.iter().map(name)).collect();
+    for l in 0..degrees {
         // What is below its error is shown as zero within it.
-        let cell = |(a, error): (f64, f64)| {
-            let shown = number(if a.abs() <= error { 0.0 } else { a }, Some(error), "").short();
-            Cell { value: bare(a).value, ..shown }
+        let cell = |(unit, _): &(Value, &str)| {
+            let (Some(a), error) = (unit["A"][l].as_f64(), unit["error_estimate"][l].as_f64()) else { return Cell::default() };
+            let shown = if error.is_some_and(|error| a.abs() <= error) { 0.0 } else { a };
+            Cell { value: bare(a).value, ..number(shown, error, "") }
         };
-        table.rows.push(std::iter::once(name).chain(cells.map(cell)).collect());
+        table.rows.push(std::iter::once(Cell::words(format!("A{l}"))).chain(rows.iter().map(cell)).collect());
     }
     let radius = all["radius"].as_f64().map_or(String::new(), |r| number(r, None, "m").text);
     table.note = format!("Found on a sphere of {radius}; V/m^l per volt for electrodes, V/m^l for what is driven.");
-    table.folded = table.rows.len() > LISTED;
     table
 }
 

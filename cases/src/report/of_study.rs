@@ -47,7 +47,7 @@ fn rows(study: &Value) -> Table {
             // The unit stands above the column.
             Value::Number(n) => {
                 let error = row[&format!("{name}_error")].as_f64();
-                n.as_f64().map_or(Cell::default(), |x| number(x, error, "").trimmed())
+                n.as_f64().map_or(Cell::default(), |x| number(x, error, ""))
             }
             Value::String(text) => Cell::words(text),
             _ => Cell::default(),

@@ -89,7 +89,10 @@ struct Tracks {
 /// A point of the field.
 #[derive(Debug, Serialize)]
 struct Mark {
-    name: String,
+    /// `null` or `minimum`.
+    kind: &'static str,
+    /// Of which field, for which grains.
+    of: String,
     position: [f64; 3],
 }
 
@@ -272,15 +275,15 @@ impl Tracks {
 /// Null points of an analysis, and the minima of the effective potential of its first grains.
 fn marks(analysis: &Value, scale: &Scale) -> Vec<Mark> {
     let nulls = analysis["nulls"].as_array().into_iter().flatten();
-    let nulls = nulls.map(|null| (format!("null of {}", null["of"].as_str().unwrap_or("the field")), &null["position"]));
+    let word = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    let nulls = nulls.map(|null| ("null", word(&null["of"]), &null["position"]));
     let minima = analysis["species"][0]["effective"].as_array().into_iter().flatten();
-    let minima = minima.filter(|point| point["kind"] == "minimum").map(|point| {
-        let of = analysis["species"][0]["name"].as_str().unwrap_or("grains");
-        (format!("minimum for {of}"), &point["position"])
-    });
-    let mark = |(name, position): (String, &Value)| {
+    let minima = minima
+        .filter(|point| point["kind"] == "minimum")
+        .map(|point| ("minimum", word(&analysis["species"][0]["name"]), &point["position"]));
+    let mark = |(kind, of, position): (&'static str, String, &Value)| {
         let [x, y, z] = [0, 1, 2].map(|k| position[k].as_f64());
-        Some(Mark { name, position: scale.of(&Vec3::new(x?, y?, z?)).into() })
+        Some(Mark { kind, of, position: scale.of(&Vec3::new(x?, y?, z?)).into() })
     };
     nulls.chain(minima).filter_map(mark).collect()
 }
