@@ -97,10 +97,13 @@ class Browser:
 
     def whole(self):
         """The whole page as PNG."""
+        self.ask("POST", self.session + "/window/rect", {"width": 1400, "height": 1000})
         height = self.run("return Math.min(8000, document.documentElement.scrollHeight)")
         self.ask("POST", self.session + "/window/rect", {"width": 1400, "height": height + 100})
         time.sleep(0.5)
-        return base64.b64decode(self.ask("GET", self.session + "/screenshot"))
+        picture = base64.b64decode(self.ask("GET", self.session + "/screenshot"))
+        self.ask("POST", self.session + "/window/rect", {"width": 1400, "height": 1000})
+        return picture
 
     def stage(self):
         """What the view shows, as rows of pixels."""

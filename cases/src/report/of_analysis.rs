@@ -107,7 +107,7 @@ fn nulls(analysis: &Value) -> Table {
 
 fn multipoles(analysis: &Value) -> Table {
     let all = &analysis["multipoles"];
-    let mut table = Table { title: "Multipoles A_l of φ = Σ A_l r^l P_l(cos θ)".to_owned(), ..Table::default() };
+    let mut table = Table { title: "Multipoles of φ = Σ Aₗ rˡ Pₗ(cos θ)".to_owned(), ..Table::default() };
     let of = |key: &str| all[key].as_array().cloned().unwrap_or_default();
     let electrodes = of("electrodes");
     let rows: Vec<(Value, &str)> = electrodes
@@ -130,7 +130,7 @@ fn multipoles(analysis: &Value) -> Table {
         table.rows.push(std::iter::once(Cell::words(format!("A{l}"))).chain(rows.iter().map(cell)).collect());
     }
     let radius = all["radius"].as_f64().map_or(String::new(), |r| number(r, None, "m").text);
-    table.note = format!("Found on a sphere of {radius}; V/m^l per volt for electrodes, V/m^l for what is driven.");
+    table.note = format!("Found on a sphere of {radius}; 1/mˡ for electrodes, V/mˡ for what is driven.");
     table
 }
 
@@ -243,7 +243,7 @@ fn wish(wish: &Value) -> Table {
 }
 
 fn wanted(wish: &Value) -> Table {
-    let mut table = Table::with_head("What was asked for (V/m^l)", &["what", "wanted", "got", "verdict"]);
+    let mut table = Table::with_head("What was asked for (V/mˡ)", &["what", "wanted", "got", "verdict"]);
     for one in wish["wanted"].as_array().into_iter().flatten() {
         table.rows.push(vec![
             words(&one["what"]).unwrap_or_default(),

@@ -140,3 +140,80 @@ fn cases(found: &Found) -> Vec<CaseCopy<'_>> {
     }
     cases
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    /// What would break a page if it were not escaped.
+    const HOSTILE: &str = "</script></title></pre><img src=x onerror=alert(1)>\"'&{{ title }}<!--";
+
+    fn hostile() -> Found {
+        let h = HOSTILE;
+        let summary = |command: &str| {
+            json!({
+                "command": command, "version": h, "title": h, "warnings": [h], "files": [h],
+                "case": { "file": h, "set": [h], "text": h },
+            })
+        };
+        let with = |command: &str, more: Value| {
+            let mut summary = summary(command);
+            summary.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+            summary
+        };
+        let run = json!({
+            "electrodes": [h], "capacitance_matrix_farad": [[1e-12]], "solver": h, "solver_reason": h, "reused": [h],
+            "trace": { "grains": 1, "outcomes": { "time_up": 0, "struck": { h: 1 } }, "integrator": h,
+                       "final": [{ "outcome": "struck", "electrode": h, "time": 1.0 }] },
+        });
+        let species = json!([{ "name": h, "center_is": h, "depth_ev": { "opening": h, "value": 1.0 },
+                               "effective": [{ "kind": "minimum", "position": [0, 0, 0] }] }]);
+        let nulls = json!([{ "of": h, "kind": h, "position": [0.0, 0.0, 0.0] }]);
+        let study = json!({ h: h, "columns": [{ "name": h, "unit": h }], "rows": [{ h: h }] });
+        Found {
+            run: Some(with("run", run)),
+            analysis: Some(with("analyse", json!({ "nulls": nulls, "species": species, "center_is": h }))),
+            study: Some(with("study", study)),
+            surface: Some(meshes::import::DataSet {
+                points: vec![meshes::Vec3::zeros(), meshes::Vec3::x(), meshes::Vec3::y()],
+                corners: vec![0, 1, 2],
+                ends: vec![3],
+                cell_arrays: vec![("electrode".into(), vec![0.0]), (format!("unit_charge_density {h}"), vec![1.0])],
+                ..Default::default()
+            }),
+            pictures: vec![(h.to_owned(), "<svg></svg>".to_owned())],
+            files: vec![h.to_owned()],
+            left_out: vec![h.to_owned()],
+            ..Found::default()
+        }
+    }
+
+    #[test]
+    fn nothing_that_a_user_wrote_is_markup() {
+        let page = page(&hostile()).unwrap();
+        assert!(!page.contains("<img src=x") && !page.contains("<!--"), "{HOSTILE}");
+        // As many as the template has: the scene, three.js, the view, sorting.
+        assert_eq!((page.matches("<script").count(), page.matches("</script>").count()), (4, 4));
+        assert_eq!((page.matches("</title>").count(), page.matches("</style>").count()), (1, 1));
+        // And all of it is there, to be read.
+        assert!(page.matches("&lt;img src=x onerror=alert(1)&gt;").count() + page.matches("&#60;img src=x").count() > 20);
+        assert!(page.contains("\\u003cimg src=x"), "the electrode's name in the scene");
+    }
+
+    #[test]
+    fn a_page_of_nothing_is_a_page() {
+        let page = page(&Found { run: Some(json!({})), ..Found::default() }).unwrap();
+        assert!(page.contains("</html>") && !page.contains("THREE"));
+    }
+
+    #[test]
+    fn what_is_shipped_in_a_page_is_small_and_stays_in_its_element() {
+        assert!(THREE.len() < 1_000_000 && THREE_LICENCE.contains("three.js authors"));
+        for script in [THREE, VIEW, SORT] {
+            assert!(!script.contains("</script") && !script.contains("<!--"));
+        }
+        assert!(!STYLE.contains("</style") && !STYLE.contains("url("));
+    }
+}

@@ -118,7 +118,6 @@ impl Scene {
             notes: Vec::new(),
         };
         if let Some(surface) = surface {
-            // Whoever wrote the surface last knows its electrodes; both tell the same of one case.
             scene.electrodes(surface, found.run.as_ref(), &scale, &mut notes);
         }
         scene.notes = notes;
@@ -137,12 +136,14 @@ impl Scene {
             notes.push(format!("The surface is drawn with {few} of its {} triangles.", grouped(all as u64)));
         }
         let names = names(surface, run);
+        // Voltages and charges are told of a surface with these electrodes only.
+        let run = run.filter(|_| names.starts_with(&told(run)));
         for (first, (_, k)) in shown.triangles.iter().enumerate() {
             let of = number[*k] as usize;
             while self.electrodes.len() <= of {
                 let k = self.electrodes.len();
                 let name = names.get(k).cloned().unwrap_or_else(|| format!("electrode {}", k + 1));
-                let at = |key: &str| run.filter(|_| k < names.len()).and_then(|run| run[key][k].as_f64());
+                let at = |key: &str| run.and_then(|run| run[key][k].as_f64());
                 let (voltage, charge) = (at("voltages_at_start"), at("charges_at_start"));
                 self.electrodes.push(Electrode { name, voltage, charge, first, count: 0 });
             }
@@ -211,15 +212,17 @@ fn bounds(surface: Option<&DataSet>, tracks: Option<&DataSet>) -> Option<Bounds>
     }
 }
 
-/// Names of the electrodes: from the summary where it has them, else from the unit solutions, of which sources have one too.
+/// Names of the electrodes, from their unit solutions (sources have some too, behind them), else from the summary.
 fn names(surface: &DataSet, run: Option<&Value>) -> Vec<String> {
-    let told = run.and_then(|run| run["electrodes"].as_array()).into_iter().flatten();
-    let told: Vec<String> = told.filter_map(Value::as_str).map(str::to_owned).collect();
-    if !told.is_empty() {
-        return told;
-    }
     let unit = surface.cell_arrays.iter().filter_map(|(name, _)| name.strip_prefix("unit_charge_density "));
-    unit.map(str::to_owned).collect()
+    let unit: Vec<String> = unit.map(str::to_owned).collect();
+    if unit.is_empty() { told(run) } else { unit }
+}
+
+/// Names of the electrodes that the summary tells of.
+fn told(run: Option<&Value>) -> Vec<String> {
+    let names = run.and_then(|run| run["electrodes"].as_array()).into_iter().flatten();
+    names.filter_map(Value::as_str).map(str::to_owned).collect()
 }
 
 impl Tracks {
