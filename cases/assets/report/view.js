@@ -211,7 +211,7 @@
       transparent: true,
       depthWrite: false,
       vertexShader: "attribute vec3 tint; attribute float when; varying vec3 shown; varying float at; void main() { shown = tint; at = when; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }",
-      fragmentShader: "uniform float now, tail, faint; varying vec3 shown; varying float at; void main() { if (at > now + 1e-6 || at < now - tail) discard; float fresh = 1.0 - (now - at) / tail; gl_FragColor = vec4(shown, faint * mix(0.25, 1.0, fresh)); }",
+      fragmentShader: "uniform float now, tail, faint; varying vec3 shown; varying float at; void main() { if (at > now + 1e-6 || at < now - tail) discard; float fresh = 1.0 - (now - at) / tail; gl_FragColor = vec4(shown, faint * mix(0.4, 1.0, fresh)); }",
     }));
     trails.frustumCulled = false;
     trails.renderOrder = 2;
