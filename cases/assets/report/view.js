@@ -170,8 +170,9 @@
     for (let value = Math.ceil(lowest / step - 1e-9) * step; value <= highest + 1e-9 * step; value += step) put(value, tidy(Math.abs(value) < 1e-9 * step ? 0 : value, 6));
     bar.append(title, strip);
     const beyond = [];
-    if (sorted[sorted.length - 1] > high * (1 + 1e-6)) beyond.push(`up to ${tidy(sorted[sorted.length - 1] * unit.factor, 3)}`);
-    if (sorted[0] < low - 1e-6 * Math.abs(low)) beyond.push(`down to ${tidy(sorted[0] * unit.factor, 3)}`);
+    // Of a few percent nobody needs to know.
+    if (sorted[sorted.length - 1] > high + 0.05 * span) beyond.push(`up to ${tidy(sorted[sorted.length - 1] * unit.factor, 3)}`);
+    if (sorted[0] < low - 0.05 * span) beyond.push(`down to ${tidy(sorted[0] * unit.factor, 3)}`);
     if (beyond.length) {
       const note = document.createElement("div");
       note.className = "title";
@@ -347,7 +348,10 @@
     const eye = camera.position, points = [], shown = [];
     centre.addVectors(frame.low, frame.high).multiplyScalar(0.5);
     const middle = onScreen(centre);
+    const towards = eye.clone().sub(orbit.target).normalize();
     for (let k = 0; k < 3; k++) {
+      // An axis that points at the viewer has nothing to tell.
+      if (Math.abs(towards.getComponent(k)) > 0.985) continue;
       const [u, v] = [(k + 1) % 3, (k + 2) % 3];
       let best = null;
       for (const [a, b] of [[0, 0], [0, 1], [1, 0], [1, 1]]) {
@@ -420,7 +424,7 @@
       for (let corner = 0; corner < 8; corner++) {
         const at = new THREE.Vector3(...[0, 1, 2].map((k) => (corner >> k & 1 ? high : low).getComponent(k)));
         const behind = at.clone().sub(camera.position).dot(arm) > -1e-6, seen = at.project(camera);
-        most = behind ? Infinity : Math.max(most, Math.abs(seen.x) / 0.82, Math.abs(seen.y) / 0.92);
+        most = behind ? Infinity : Math.max(most, Math.abs(seen.x) / 0.82, Math.abs(seen.y) / 0.85);
       }
       if (most <= 1) break;
       distance *= 1.06;
