@@ -76,7 +76,8 @@ impl Found {
         }
         if files.is_empty() && summaries.iter().all(|s| s.is_none()) {
             let problem = format!("{} holds no results of graintrap", folder.display());
-            let help = "a folder with summary.json, analysis.json or study.json was expected: `graintrap run CASE` writes one";
+            let help =
+                "a folder with summary.json, analysis.json or study.json was expected: `graintrap run CASE` writes one";
             return Err(Failure::usage(problem, help));
         }
         found.surface = found.data_set(folder, &files, electrodes::FILE, |name| {
@@ -84,7 +85,8 @@ impl Found {
         })?;
         if let Some(surface) = &found.surface {
             let triangles = surface.cells().all(|cell| cell.len() == 3);
-            let is_one = |number: &f64| (0.0..=surface.ends.len() as f64 + 1e6).contains(number) && number.fract() == 0.0;
+            let is_one =
+                |number: &f64| (0.0..=surface.ends.len() as f64 + 1e6).contains(number) && number.fract() == 0.0;
             if !triangles || !surface.cell_array("electrode").is_some_and(|numbers| numbers.iter().all(is_one)) {
                 return Err(damaged(&folder.join(electrodes::FILE), "it holds no triangles of electrodes"));
             }

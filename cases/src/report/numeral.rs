@@ -73,11 +73,8 @@ pub fn bare(value: f64) -> Cell {
 
 /// A relative error or the like, of which one digit matters.
 pub fn rough(value: f64) -> Cell {
-    let text = if value != 0.0 && (value.abs() < 1e-2 || value.abs() >= 1e4) {
-        power(value, 0)
-    } else {
-        decimal(value, 1)
-    };
+    let text =
+        if value != 0.0 && (value.abs() < 1e-2 || value.abs() >= 1e4) { power(value, 0) } else { decimal(value, 1) };
     Cell { text, value: Some(exact(value)) }
 }
 
@@ -105,7 +102,11 @@ fn with_error(value: f64, error: Option<f64>) -> String {
             let size = value.abs().max(error);
             // As many decimals as the error has with one digit, of all digits at most so many.
             let shown = (-exponent(error) + exponent(size) + 1).clamp(1, MOST);
-            let number = if value == 0.0 { "0".to_owned() } else { significant(value, shown - exponent(size) + exponent(value)) };
+            let number = if value == 0.0 {
+                "0".to_owned()
+            } else {
+                significant(value, shown - exponent(size) + exponent(value))
+            };
             let error = if (1e-3..1e4).contains(&error) { decimal(error, 1) } else { power(error, 0) };
             format!("{number} ± {error}")
         }

@@ -91,7 +91,8 @@ fn nulls(analysis: &Value) -> Table {
     for null in all.iter().take(LISTED) {
         let error = null["curvature_error_estimate"].as_f64();
         let curvatures = list(&null["curvatures"]).into_iter().map(|c| number(c, error, "").short().text);
-        let many = if null["one_of_many"].as_bool() == Some(true) { ", one of a line or ring of such points" } else { "" };
+        let many =
+            if null["one_of_many"].as_bool() == Some(true) { ", one of a line or ring of such points" } else { "" };
         table.rows.push(vec![
             words(&null["of"]).unwrap_or_default(),
             Cell::words(format!("{}{many}", null["kind"].as_str().unwrap_or_default())),
@@ -123,7 +124,9 @@ fn multipoles(analysis: &Value) -> Table {
     for l in 0..degrees {
         // What is below its error is shown as zero within it.
         let cell = |(unit, _): &(Value, &str)| {
-            let (Some(a), error) = (unit["A"][l].as_f64(), unit["error_estimate"][l].as_f64()) else { return Cell::default() };
+            let (Some(a), error) = (unit["A"][l].as_f64(), unit["error_estimate"][l].as_f64()) else {
+                return Cell::default();
+            };
             let shown = if error.is_some_and(|error| a.abs() <= error) { 0.0 } else { a };
             Cell { value: bare(a).value, ..number(shown, error, "") }
         };
@@ -204,7 +207,10 @@ fn well(species: &Value) -> Table {
     table.put("it opens", opening.map(Cell::words));
     table.put("there", point(&depth["point"]));
     table.put("adiabaticity", species["adiabaticity"].as_f64().map(bare));
-    table.put("micromotion at the equilibrium", species["micromotion"]["at_equilibrium"].as_f64().map(|x| number(x, None, "m")));
+    table.put(
+        "micromotion at the equilibrium",
+        species["micromotion"]["at_equilibrium"].as_f64().map(|x| number(x, None, "m")),
+    );
     table.put("gravity and constant forces shift it by", point(&species["offset"]["shift"]));
     table.put("1 V/m of stray field along each axis shifts it by", point(&species["offset"]["per_field"]));
     let volts = species["offset"]["compensation"]["volts"].as_object().into_iter().flatten();
@@ -215,8 +221,10 @@ fn well(species: &Value) -> Table {
 }
 
 fn effective(species: &Value) -> Table {
-    let mut table =
-        Table::with_head("Minima and saddles of the effective potential", &["kind", "position", "within", "above the centre"]);
+    let mut table = Table::with_head(
+        "Minima and saddles of the effective potential",
+        &["kind", "position", "within", "above the centre"],
+    );
     let all = species["effective"].as_array().map(Vec::as_slice).unwrap_or_default();
     for one in all.iter().take(LISTED) {
         let many = if one["one_of_many"].as_bool() == Some(true) { ", one of a line or ring" } else { "" };

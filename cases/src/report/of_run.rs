@@ -80,7 +80,8 @@ fn ends(run: &Value) -> Table {
             ("time_up", None) => "still flying".to_owned(),
             (other, None) => other.replace('_', " "),
         };
-        let vector = |key: &str| -> Vec<f64> { end[key].as_array().into_iter().flatten().filter_map(Value::as_f64).collect() };
+        let vector =
+            |key: &str| -> Vec<f64> { end[key].as_array().into_iter().flatten().filter_map(Value::as_f64).collect() };
         let speed = vector("velocity").iter().map(|v| v * v).sum::<f64>().sqrt();
         let words = Cell::words;
         table.rows.push(vec![
@@ -126,13 +127,10 @@ fn cloud(run: &Value) -> Table {
 
 fn electrodes(run: &Value) -> Table {
     let mut table = Table::with_head("At the start", &["electrode", "voltage", "charge"]);
-    let cell = |key: &str, k: usize, unit: &str| run[key][k].as_f64().map_or(Cell::default(), |x| number(x, None, unit));
+    let cell =
+        |key: &str, k: usize, unit: &str| run[key][k].as_f64().map_or(Cell::default(), |x| number(x, None, unit));
     for (k, name) in names(run).into_iter().enumerate() {
-        table.rows.push(vec![
-            Cell::words(name),
-            cell("voltages_at_start", k, "V"),
-            cell("charges_at_start", k, "C"),
-        ]);
+        table.rows.push(vec![Cell::words(name), cell("voltages_at_start", k, "V"), cell("charges_at_start", k, "C")]);
     }
     table.folded = table.rows.len() > ELECTRODES;
     table
@@ -202,7 +200,10 @@ fn table(run: &Value) -> Table {
 fn work(run: &Value) -> Table {
     let mut table = Table::of_values("Time and memory");
     for stage in ["mesh", "solve", "table", "trace", "write"] {
-        table.put(stage, run["seconds"][stage].as_f64().map(|t| Cell { text: format!("{t:.2} s"), value: Some(exact(t)) }));
+        table.put(
+            stage,
+            run["seconds"][stage].as_f64().map(|t| Cell { text: format!("{t:.2} s"), value: Some(exact(t)) }),
+        );
     }
     table.put("threads", run["threads"].as_u64().map(Cell::count));
     table.put("memory at most", run["peak_memory_bytes"].as_u64().filter(|n| *n > 0).map(bytes));

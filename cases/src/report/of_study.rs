@@ -33,13 +33,15 @@ fn rows(study: &Value) -> Table {
         .iter()
         .filter_map(|column| Some((column["name"].as_str()?, column["unit"].as_str().unwrap_or_default())))
         .collect();
-    let is_error = |name: &str| name.strip_suffix("_error").is_some_and(|of| names.iter().any(|(known, _)| *known == of));
+    let is_error =
+        |name: &str| name.strip_suffix("_error").is_some_and(|of| names.iter().any(|(known, _)| *known == of));
     let all = study["rows"].as_array().map(Vec::as_slice).unwrap_or_default();
     // Columns of reasons and warnings that nobody has would only be in the way.
     let there = |name: &str| all.iter().any(|row| !row[name].is_null());
     let shown: Vec<&(&str, &str)> = names.iter().filter(|(name, _)| !is_error(name) && there(name)).collect();
     let mut table = Table { title: "Points".to_owned(), sortable: true, ..Table::default() };
-    let head = shown.iter().map(|(name, unit)| if unit.is_empty() { (*name).to_owned() } else { format!("{name} ({unit})") });
+    let head =
+        shown.iter().map(|(name, unit)| if unit.is_empty() { (*name).to_owned() } else { format!("{name} ({unit})") });
     table.head = head.collect();
     for row in all.iter().take(ROWS) {
         let cell = |(name, _): &&(&str, &str)| match &row[name] {

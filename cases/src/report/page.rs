@@ -100,9 +100,8 @@ pub fn page(found: &Found) -> Result<String, Failure> {
         view: VIEW,
         sort: SORT,
     };
-    page.render().map_err(|error| {
-        Failure::run(format!("the page cannot be made: {error}"), "this is a fault of graintrap")
-    })
+    page.render()
+        .map_err(|error| Failure::run(format!("the page cannot be made: {error}"), "this is a fault of graintrap"))
 }
 
 impl Picture {
@@ -198,7 +197,9 @@ mod tests {
         assert_eq!((page.matches("<script").count(), page.matches("</script>").count()), (4, 4));
         assert_eq!((page.matches("</title>").count(), page.matches("</style>").count()), (1, 1));
         // And all of it is there, to be read.
-        assert!(page.matches("&lt;img src=x onerror=alert(1)&gt;").count() + page.matches("&#60;img src=x").count() > 20);
+        assert!(
+            page.matches("&lt;img src=x onerror=alert(1)&gt;").count() + page.matches("&#60;img src=x").count() > 20
+        );
         assert!(page.contains("\\u003cimg src=x"), "the electrode's name in the scene");
     }
 

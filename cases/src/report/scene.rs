@@ -343,7 +343,8 @@ mod tests {
         assert_eq!((told.start, told.end, &unpacked(&told.times)[..5]), (5.0, 9.0, &[0.0, 0.25, 0.5, 0.75, 1.0][..]));
         let points = unpacked(&told.points);
         // The second grain's last sample, back in metres.
-        let back = Vec3::new(points[27].into(), points[28].into(), points[29].into()) * scene.size + Vec3::from(scene.center);
+        let back =
+            Vec3::new(points[27].into(), points[28].into(), points[29].into()) * scene.size + Vec3::from(scene.center);
         assert_eq!(back, Vec3::new(1.0, 1.0, 0.0));
         assert!(scene.notes.is_empty());
     }
@@ -357,7 +358,10 @@ mod tests {
         // Beginning and end are there.
         let (times, points) = (unpacked(&told.times), unpacked(&told.points));
         let last = lengths[0] as usize - 1;
-        assert_eq!((times[0], times[last], points[0], points[3 * last]), (0.0, 1.0, points[0], points[0] + (1.0 / scene.size) as f32));
+        assert_eq!(
+            (times[0], times[last], points[0], points[3 * last]),
+            (0.0, 1.0, points[0], points[0] + (1.0 / scene.size) as f32)
+        );
         assert!(scene.notes[0].contains("one in"), "{:?}", scene.notes);
         assert!(scene.json().len() < 8_000_000);
     }

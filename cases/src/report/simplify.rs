@@ -68,7 +68,10 @@ mod tests {
 
     fn area(mesh: &Triangles) -> f64 {
         let corner = |v: u32| mesh.vertices[v as usize];
-        mesh.triangles.iter().map(|([a, b, c], _)| (corner(*b) - corner(*a)).cross(&(corner(*c) - corner(*a))).norm() / 2.0).sum()
+        mesh.triangles
+            .iter()
+            .map(|([a, b, c], _)| (corner(*b) - corner(*a)).cross(&(corner(*c) - corner(*a))).norm() / 2.0)
+            .sum()
     }
 
     #[test]

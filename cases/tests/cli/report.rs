@@ -69,7 +69,9 @@ fn cli_report_of_a_run_tells_its_numbers_and_places() {
 
     let told = numbers(&page);
     let mut expected = Vec::new();
-    for key in ["capacitance_matrix_farad", "voltages_at_start", "charges_at_start", "error_estimate", "field_error_estimate"] {
+    for key in
+        ["capacitance_matrix_farad", "voltages_at_start", "charges_at_start", "error_estimate", "field_error_estimate"]
+    {
         leaves(&run[key], &mut expected);
     }
     for key in ["grains", "steps", "position_error_estimate", "outcomes"] {
@@ -84,8 +86,10 @@ fn cli_report_of_a_run_tells_its_numbers_and_places() {
 
     // The title is text, the case as it was read stands there, and nothing is loaded from anywhere.
     assert!(!page.contains("<b>bold") && page.contains("bold") && page.matches("</title>").count() == 1);
-    let escaped = |text: &str| text.replace('&', "&#38;").replace('"', "&#34;").replace('<', "&#60;").replace('>', "&#62;");
-    let line = fs::read_to_string(tiny()).unwrap().lines().find(|line| line.contains("wire_radius")).unwrap().to_owned();
+    let escaped =
+        |text: &str| text.replace('&', "&#38;").replace('"', "&#34;").replace('<', "&#60;").replace('>', "&#62;");
+    let line =
+        fs::read_to_string(tiny()).unwrap().lines().find(|line| line.contains("wire_radius")).unwrap().to_owned();
     assert!(page.contains(&escaped(&line)), "{line}");
     assert!(page.contains("Content-Security-Policy\" content=\"default-src 'none'"));
     for load in ["src=\"http", "href=\"http", "src=\"//", "@import", "url("] {
