@@ -338,7 +338,7 @@ mod tests {
     #[test]
     fn tracks_are_told_in_the_order_of_the_grains() {
         let scene = scene(tracks(3, 5), None);
-        let told = scene.tracks.unwrap();
+        let told = scene.tracks.as_ref().unwrap();
         assert_eq!((numbers(&told.grains), numbers(&told.lengths)), (vec![0, 1, 2], vec![5; 3]));
         assert_eq!((told.start, told.end, &unpacked(&told.times)[..5]), (5.0, 9.0, &[0.0, 0.25, 0.5, 0.75, 1.0][..]));
         let points = unpacked(&told.points);
@@ -352,7 +352,7 @@ mod tests {
     #[test]
     fn long_tracks_are_thinned_and_it_is_said() {
         let scene = scene(tracks(1000, 1001), None);
-        let told = scene.tracks.unwrap();
+        let told = scene.tracks.as_ref().unwrap();
         let lengths = numbers(&told.lengths);
         assert!(lengths.iter().sum::<u32>() as usize <= SAMPLES);
         // Beginning and end are there.
