@@ -1,7 +1,7 @@
 //! What there is in a folder of results.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use meshes::import::DataSet;
 use serde_json::Value;
@@ -134,7 +134,7 @@ impl Found {
     }
 
     /// The content of a file that is named, unless it is no longer there.
-    fn bytes(&mut self, path: &PathBuf) -> Result<Option<Vec<u8>>, Failure> {
+    fn bytes(&mut self, path: &Path) -> Result<Option<Vec<u8>>, Failure> {
         let bytes = content(path)?;
         if bytes.is_none() {
             let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();

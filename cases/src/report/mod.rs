@@ -1,8 +1,8 @@
 //! One HTML page of what a run, an analysis or a study left in a folder.
 //!
-//! * **found**: what is in the folder and belongs to its `summary.json`, `analysis.json` or `study.json` ([`found`]);
-//! * **tables**: its numbers with their errors, for people and, in `<data value>`, as they were computed ([`table`]);
-//! * **scene**: electrodes, tracks and null points as the 3D view draws them, of bounded size ([`scene`]);
+//! * **found**: what is in the folder and belongs to its `summary.json`, `analysis.json` or `study.json`;
+//! * **tables**: its numbers with their errors, for people and, in `<data value>`, as they were computed;
+//! * **scene**: electrodes, tracks and null points as the 3D view draws them, of bounded size;
 //! * **page**: all of that in one file, with the library that draws it ([`page`](page())).
 //!
 //! *Why three.js.* It is maintained, its licence is MIT, and the parts that are needed are 0.6 MB; vtk.js, which could read the
