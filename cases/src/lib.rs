@@ -29,7 +29,7 @@
 //! [`pipeline`] has one file for each stage: a checked case ([`pipeline::ready`]), unit solutions to the accuracy asked
 //! ([`pipeline::solution`]), their table ([`pipeline::tables`]), the driven field ([`pipeline::drives`]) and the flights
 //! ([`pipeline::flights`]). [`output`] writes what came of them, [`plots`] draws, [`cache`] keeps solutions for the next run,
-//! [`study`] does it for many points of a sweep, and [`cli`] is the command.
+//! [`study`] does it for many points of a sweep, [`report`] makes a page of what was written, and [`cli`] is the command.
 
 pub mod cache;
 pub mod case;
@@ -45,6 +45,7 @@ pub mod pipeline;
 pub mod plots;
 pub mod quantity;
 mod reader;
+pub mod report;
 mod resolve;
 mod schema;
 mod set;

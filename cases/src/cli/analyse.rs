@@ -4,10 +4,12 @@ use std::time::Instant;
 
 use super::fields::{solved, tabulated};
 use super::session::Session;
-use crate::output::{analysis_chart, analysis_pictures, analysis_text};
+use crate::output::summary::CaseText;
+use crate::output::{analysis_chart, analysis_pictures, analysis_text, electrodes};
 use crate::pipeline::analysis::analyse as analysis;
 use crate::pipeline::analysis::chart::scan;
 use crate::pipeline::choice::Solver;
+use crate::pipeline::drives::strengths;
 use crate::pipeline::ready::ready;
 use crate::pipeline::{Failure, Reporter};
 
@@ -44,6 +46,9 @@ pub(super) fn analyse(session: &Session) -> Result<(), Failure> {
         }
     };
     session.progress.stage("pictures");
+    let start_of_flight = case.trace.as_ref().map_or(0.0, |trace| trace.start);
+    let strengths = strengths(case, &solution.basis, start_of_flight);
+    out.write(electrodes::FILE, |w| electrodes::write(w, case, &solution.basis, &strengths))?;
     analysis_pictures::write(&mut out, case, &session.title(), &solution, &report, &shown)?;
     if let (Some(short), Some(scan)) = (&report.chart, &scan) {
         analysis_chart::write(&mut out, &session.title(), short, scan)?;
@@ -53,6 +58,7 @@ pub(super) fn analyse(session: &Session) -> Result<(), Failure> {
     report.version = env!("CARGO_PKG_VERSION");
     report.command = "analyse";
     report.title = session.title();
+    report.case = Some(CaseText::new(source));
     report.seconds = start.elapsed().as_secs_f64();
     report.warnings = session.progress.warnings();
     report.files = out.names().to_vec();

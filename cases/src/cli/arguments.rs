@@ -35,6 +35,8 @@ pub(super) enum Verb {
     Trace(RunArguments),
     /// A sweep: the case at many points, resumable, in shards if wanted
     Study(StudyArguments),
+    /// One HTML page of what a run, an analysis or a study left in a folder
+    Report(ReportArguments),
     /// Print the JSON Schema of the case file, for editors
     Schema,
     /// Print a script that completes arguments in a shell
@@ -55,7 +57,15 @@ impl Verb {
             Self::Run(arguments) | Self::Trace(arguments) => Some(&arguments.common),
             Self::Probe(arguments) => Some(&arguments.common),
             Self::Study(arguments) => Some(&arguments.common),
-            Self::Schema | Self::Completions { .. } => None,
+            Self::Report(_) | Self::Schema | Self::Completions { .. } => None,
+        }
+    }
+
+    /// Whether one JSON object is to be printed.
+    pub fn json(&self) -> bool {
+        match self {
+            Self::Report(arguments) => arguments.json,
+            verb => verb.common().is_some_and(|common| common.json),
         }
     }
 }
@@ -107,6 +117,21 @@ pub(super) struct StudyArguments {
     /// Join the parts that shards wrote
     #[arg(long, value_name = "DIR", num_args = 1..)]
     pub merge: Vec<PathBuf>,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(super) struct ReportArguments {
+    /// Folder that `graintrap run`, `analyse`, `solve` or `study` wrote
+    pub folder: PathBuf,
+    /// The page [default: DIR/report.html]
+    #[arg(short, long, value_name = "FILE.html")]
+    pub output: Option<PathBuf>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Args, Clone, Debug)]

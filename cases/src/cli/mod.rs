@@ -8,6 +8,7 @@ mod interrupt;
 mod mesh;
 mod probe;
 mod progress;
+mod report;
 mod run;
 mod session;
 mod study;
@@ -26,11 +27,11 @@ use session::Session;
 /// Reads the arguments and does what they ask; gives the exit status: 0 done, 1 the run failed, 2 wrong use or a wrong case.
 pub fn main() -> ExitCode {
     let verb = Arguments::parse().verb;
-    let json = verb.common().is_some_and(|common| common.json);
+    let json = verb.json();
     match dispatch(&verb) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            report(&failure, json);
+            refuse(&failure, json);
             ExitCode::from(failure.status())
         }
     }
@@ -47,6 +48,7 @@ fn dispatch(verb: &Verb) -> Result<(), Failure> {
         Verb::Analyse(common) => analyse::analyse(&open(common)?),
         Verb::Probe(arguments) => probe::probe(&open(&arguments.common)?, arguments),
         Verb::Study(arguments) => study::study(open(&arguments.common)?, arguments),
+        Verb::Report(arguments) => report::report(arguments),
         Verb::Schema => {
             let text = serde_json::to_string_pretty(&schema()).unwrap_or_default();
             print(&format!("{text}\n"));
@@ -76,7 +78,7 @@ fn print(text: &str) {
     let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
 }
 
-fn report(failure: &Failure, json: bool) {
+fn refuse(failure: &Failure, json: bool) {
     let (words, object) = match failure {
         Failure::Case(error) => (error.report(Look::of_stderr()), error.json()),
         Failure::Usage { problem, help } | Failure::Run { problem, help } => (

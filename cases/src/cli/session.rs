@@ -9,6 +9,7 @@ use super::{interrupt, print};
 use crate::CaseSource;
 use crate::cache::{Cache, Unusable};
 use crate::case::Case;
+use crate::output::summary::CaseText;
 use crate::output::{OutputFolder, Summary};
 use crate::pipeline::{Failure, memory};
 
@@ -64,6 +65,7 @@ impl Session {
             version: env!("CARGO_PKG_VERSION"),
             command,
             title: self.title(),
+            case: Some(CaseText::new(&self.source)),
             threads: rayon::current_num_threads(),
             ..Summary::default()
         }

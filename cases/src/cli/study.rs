@@ -13,6 +13,7 @@ use crate::cache::Cache;
 use crate::case::{StudyKind, Sweep};
 use crate::output::OutputFolder;
 use crate::output::pictures;
+use crate::output::summary::CaseText;
 use crate::pipeline::{Failure, Reporter, memory};
 use crate::study::figures::figure;
 use crate::study::files::{CSV, JSON, PARQUET, Table, unknown_report};
@@ -179,6 +180,7 @@ fn finish(
         "version": env!("CARGO_PKG_VERSION"),
         "command": "study",
         "title": session.title(),
+        "case": CaseText::new(&session.source),
         "kind": session.case.study.kind,
         "points": rows.len(),
         "failed": failed.len(),

@@ -176,6 +176,24 @@ impl Drop for OutputFolder {
     }
 }
 
+/// Writes a file on its own, which gets its name when it is whole. What a run is writing beside it is left alone.
+///
+/// # Errors
+/// The disk refuses it, or a folder has that name.
+pub fn write_alone(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let failed = |error: io::Error| {
+        let help = "is there room on the disk, and does its folder exist? Give another place with -o FILE";
+        Failure::run(format!("{} cannot be written: {}", path.display(), plain(&error)), help)
+    };
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let temporary = path.with_file_name(format!(".{name}-{}{PARTIAL}", std::process::id()));
+    let written = fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path));
+    written.map_err(|error| {
+        let _ = fs::remove_file(&temporary);
+        failed(error)
+    })
+}
+
 /// Removes unfinished files in an output folder and the folders in it that are ours.
 pub fn remove_all_partial(folder: &Path) {
     for part in ["", "grains", "cache"] {

@@ -6,6 +6,7 @@ use meshes::{MeshReport, SurfaceMesh};
 use serde::Serialize;
 use tracer::{Ensemble, Outcome, Region};
 
+use crate::CaseSource;
 use crate::case::{Case, Drive, GROUND};
 use crate::pipeline::analysis::brief::Brief;
 use crate::pipeline::flights::Flights;
@@ -25,6 +26,9 @@ pub struct Summary {
     pub command: &'static str,
     /// Title of the case.
     pub title: String,
+    /// The case itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub case: Option<CaseText>,
     /// The mesh and what was solved on it.
     #[serde(flatten)]
     pub solve: Option<SolveSummary>,
@@ -49,6 +53,25 @@ pub struct Summary {
     pub warnings: Vec<String>,
     /// Files that were written, relative to the folder; the frames of the animation are counted in one entry of `grains.pvd`.
     pub files: Vec<String>,
+}
+
+/// A case as it was read, so that results say what they are of.
+#[derive(Clone, Debug, Serialize)]
+pub struct CaseText {
+    /// The case file, as it was named.
+    pub file: String,
+    /// What `--set` changed, as `key=value`.
+    pub set: Vec<String>,
+    /// The text of the file.
+    pub text: String,
+}
+
+impl CaseText {
+    /// Of a case that was read.
+    pub fn new(source: &CaseSource) -> Self {
+        let file = source.path.display().to_string();
+        Self { file, set: source.sets.clone(), text: source.text.clone() }
+    }
 }
 
 /// The solved surface.

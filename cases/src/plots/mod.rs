@@ -24,7 +24,7 @@ mod draw;
 mod legend;
 mod phase_planes;
 mod potential_map;
-mod prefix;
+pub(crate) mod prefix;
 mod spectrum;
 mod thin;
 mod track;

@@ -2,7 +2,7 @@
 
 /// A unit of an axis: SI values times `factor` are in `name`.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct AxisUnit {
+pub(crate) struct AxisUnit {
     pub name: String,
     pub factor: f64,
 }
@@ -12,7 +12,7 @@ const PREFIXES: [(i32, &str); 8] =
 
 /// The multiple of the SI unit `si` in which the largest of `values` lies between 1 and 1000; the unit itself when all
 /// are zero. Prefixes end at 10^`highest`: seconds and metres per second are not counted in thousands.
-pub(super) fn axis_unit(values: impl Iterator<Item = f64>, si: &str, highest: i32) -> AxisUnit {
+pub(crate) fn axis_unit(values: impl Iterator<Item = f64>, si: &str, highest: i32) -> AxisUnit {
     let largest = values.filter(|v| v.is_finite()).fold(0.0, |largest: f64, v| largest.max(v.abs()));
     if largest == 0.0 {
         return AxisUnit { name: si.to_owned(), factor: 1.0 };

@@ -53,6 +53,7 @@ use std::fmt;
 
 pub use clean::Cleaned;
 pub use error::{Census, ImportError, Position};
+pub use vtu::DataSet;
 
 use crate::Vec3;
 

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::chart::{Scan, edges};
 use crate::case::{Chart, ChartAxis, GrainGroup};
+use crate::output::summary::CaseText;
 
 /// What `graintrap analyse` prints as JSON.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -16,6 +17,9 @@ pub struct Report {
     pub command: &'static str,
     /// Title of the case.
     pub title: String,
+    /// The case itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub case: Option<CaseText>,
     /// Centre of the multipoles, m.
     pub center: [f64; 3],
     /// What it is.

@@ -11,10 +11,12 @@
 //! are refused with the advice to use zlib.
 
 mod data;
+mod data_set;
 
 use roxmltree::{Document, Node};
 
 use self::data::Storage;
+pub use self::data_set::DataSet;
 use super::build::Builder;
 use super::cells::{add_cell, group_rank, groups_of};
 use super::{Format, ImportError, ImportedMesh, Position};
@@ -23,6 +25,17 @@ use crate::Vec3;
 type Result<T> = std::result::Result<T, ImportError>;
 
 pub(super) fn read(bytes: &[u8]) -> Result<ImportedMesh> {
+    parsed(bytes, |grid, storage, polygonal| {
+        let mut mesh = Builder::new(0);
+        for piece in grid.children().filter(|node| node.has_tag_name("Piece")) {
+            read_piece(&mut mesh, piece, storage, polygonal)?;
+        }
+        mesh.finish()
+    })
+}
+
+/// Hands over the element that contains the pieces of a file, where its arrays are, and whether it is polygonal.
+fn parsed<T>(bytes: &[u8], read: impl FnOnce(Node<'_, '_>, &Storage<'_>, bool) -> Result<T>) -> Result<T> {
     if Format::from_content(bytes) != Some(Format::Vtu) {
         return Err(Format::Vtu.mismatch(bytes, "\"<VTKFile\""));
     }
@@ -52,11 +65,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<ImportedMesh> {
             change: "save the surface as .vtu (UnstructuredGrid), all in one file",
         });
     }
-    let mut mesh = Builder::new(0);
-    for piece in grid.children().filter(|node| node.has_tag_name("Piece")) {
-        read_piece(&mut mesh, piece, &storage, kind == "PolyData")?;
-    }
-    mesh.finish()
+    read(grid, &storage, kind == "PolyData")
 }
 
 fn line(node: Node<'_, '_>) -> Position {
