@@ -1,5 +1,6 @@
 //! What a case is like as a trap: null points, multipoles, and for each group of grains its equilibrium, frequencies and depth.
 
+pub mod brief;
 pub mod chart;
 pub mod report;
 mod species;
@@ -50,6 +51,8 @@ struct Ground<'a> {
     bounds: Region,
     /// Where no effective potential says what the centre is.
     fallback: (Vec3, String),
+    /// Whether the motion about equilibria is looked at.
+    motion: bool,
 }
 
 /// How much of the largest multipole a smaller one must be on the sphere to be listed.
@@ -113,7 +116,7 @@ pub fn analyse(
         (None, Some(null)) => (null.position, "the null of the static field nearest to the middle".to_owned()),
         (None, None) => (middle, "the middle of electrodes and sources".to_owned()),
     };
-    let ground = Ground { case, source, solution, driven: &driven, tones, space, lattice, bounds, fallback };
+    let ground = Ground { case, source, solution, driven: &driven, tones, space, lattice, bounds, fallback, motion: true };
     // 2. Each group of grains.
     let mut species = Vec::with_capacity(case.grains.len());
     let mut effective = None;
