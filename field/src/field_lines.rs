@@ -25,12 +25,14 @@ const START: f64 = 1.5;
 const STEP: f64 = 0.5;
 const LONGEST: f64 = 0.3;
 
-/// Nearer to the grid than this, in pitches, a line that heads for it (within 60 degrees of the way straight on) ends there.
-const LANDING: f64 = 0.01;
+/// Nearer to the grid than this part of a wire's width, a line that heads for it ends there: on a wire in a uniform field all lines that
+/// are within this angle (its cosine) of straight on do, ψ = (r + a²/r) sin θ < 2a.
+const LANDING: f64 = 0.05;
+const STRAIGHT: f64 = 0.8;
 
-/// Panels stand out of a round surface here, and lie below it there. Where, this near (pitches), the field has fallen to this part of
-/// what it was a step before, a line has gone through the true surface.
-const NEAR: f64 = 0.1;
+/// Panels stand out of a round surface here, and lie below it there. Where, this near (in widths of a wire), the field has fallen to
+/// this part of what it was a step before, a line has gone through the true surface.
+const NEAR: f64 = 0.25;
 const GONE: f64 = 0.1;
 
 /// Steps after which a line is in a place where there is no field.
@@ -91,7 +93,7 @@ pub fn field_lines(
         let longest = LONGEST * grid.pitch;
         let near: Vec<_> = places.iter().map(|p| surface.nearest(p, longest / STEP)).collect();
         // A step from the surface itself must leave it or end there.
-        let free = |near: &Option<Nearest>| near.map_or(longest, |near| STEP * near.distance).max(1e-3 * grid.pitch);
+        let free = |near: &Option<Nearest>| near.map_or(longest, |near| STEP * near.distance).max(1e-2 * grid.wire);
         let steps: Vec<f64> = near.iter().map(free).collect();
         let here = slopes(&places);
         let k1 = unit(&here, &ways);
@@ -102,9 +104,9 @@ pub fn field_lines(
         for n in 0..places.len() {
             let step = (k1[n] + (k2[n] + k3[n]) * 2.0 + k4[n]) * (steps[n] / 6.0);
             let (from, to) = (places[n], places[n] + step);
-            if let Some(near) = near[n].filter(|near| near.electrode == own && near.distance < NEAR * grid.pitch) {
-                let lands = k1[n].dot(&(near.point - from)) > 0.5 * near.distance;
-                if lands && near.distance < LANDING * grid.pitch || here[n].norm() < GONE * sizes[n] {
+            if let Some(near) = near[n].filter(|near| near.electrode == own && near.distance < NEAR * grid.wire) {
+                let lands = k1[n].dot(&(near.point - from)) > STRAIGHT * near.distance;
+                if lands && near.distance < LANDING * grid.wire || here[n].norm() < GONE * sizes[n] {
                     counts.caught += 1;
                     continue;
                 }
@@ -161,8 +163,7 @@ mod tests {
                 let n = sin.0.hypot(sin.1).powi(2);
                 let cot = ((cos.0 * sin.0 + cos.1 * sin.1) / n, (cos.1 * sin.0 - cos.0 * sin.1) / n);
                 // Re(ln sin πw)' : gradient (Re π cot, -Im π cot).
-                samples.gradient[k] =
-                    Vec3::new(im + self.charge * PI * cot.0, 0.0, re - self.charge * PI * cot.1);
+                samples.gradient[k] = Vec3::new(im + self.charge * PI * cot.0, 0.0, re - self.charge * PI * cot.1);
             }
         }
     }
@@ -178,7 +179,14 @@ mod tests {
         let mesh = SurfaceMesh::assemble([("wires".to_owned(), triangulate(&shape, 3.0).unwrap())]);
         let tree = SurfaceTree::new(&mesh);
         let frame = [Vec3::x(), Vec3::y(), Vec3::z()];
-        let grid = GridFrame { center: Vec3::zeros(), frame, cell: [1.0; 2], pitch: 1.0, half_thickness: radius };
+        let grid = GridFrame {
+            center: Vec3::zeros(),
+            frame,
+            cell: [1.0; 2],
+            pitch: 1.0,
+            wire: 2.0 * radius,
+            half_thickness: radius,
+        };
         let lines = 2000;
         let follow = |charge: f64, side: f64| {
             field_lines(&Wires { radius, charge }, &[1.0], &tree, 0, &grid, side, lines).unwrap()

@@ -33,6 +33,8 @@ pub struct GridFrame {
     pub cell: [f64; 2],
     /// Distance of neighbouring holes or wires, m.
     pub pitch: f64,
+    /// Width of a wire, or of a bar between holes, m.
+    pub wire: f64,
     /// Half of what it takes up along its normal, m.
     pub half_thickness: f64,
 }
@@ -51,7 +53,8 @@ pub fn ripple_depths(field: &dyn BasisField, weights: &[f64], grid: &GridFrame, 
         return [None; 2];
     }
     let excess = |side: f64, height: f64| {
-        (ripple(field, weights, grid, side * (grid.half_thickness + height * grid.pitch)).largest / (share * strongest)).ln()
+        (ripple(field, weights, grid, side * (grid.half_thickness + height * grid.pitch)).largest / (share * strongest))
+            .ln()
     };
     [0, 1].map(|k| {
         let side = if k == 0 { 1.0 } else { -1.0 };
@@ -149,7 +152,7 @@ mod tests {
         let pitch = 2e-3;
         let own = PI / pitch;
         let frame = [Vec3::x(), Vec3::y(), Vec3::z()];
-        let grid = GridFrame { center: Vec3::zeros(), frame, cell: [pitch; 2], pitch, half_thickness: 0.0 };
+        let grid = GridFrame { center: Vec3::zeros(), frame, cell: [pitch; 2], pitch, wire: 0.0, half_thickness: 0.0 };
         for (share, uniform) in [(0.02, 0.0), (0.01, own), (0.3, -2.0 * own)] {
             let field = Wires { pitch, uniform, bend: uniform / 20e-3 };
             let depths = ripple_depths(&field, &[3.0], &grid, share);
@@ -177,7 +180,8 @@ mod tests {
             }
         }
         let frame = [Vec3::x(), Vec3::y(), Vec3::z()];
-        let grid = GridFrame { center: Vec3::zeros(), frame, cell: [1.0; 2], pitch: 1.0, half_thickness: 0.0 };
+        let grid =
+            GridFrame { center: Vec3::zeros(), frame, cell: [1.0; 2], pitch: 1.0, wire: 0.0, half_thickness: 0.0 };
         assert_eq!(ripple_depths(&Bent, &[1.0], &grid, 1e-3), [None; 2]);
     }
 }

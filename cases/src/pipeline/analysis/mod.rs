@@ -116,7 +116,8 @@ pub fn analyse(
         (None, Some(null)) => (null.position, "the null of the static field nearest to the middle".to_owned()),
         (None, None) => (middle, "the middle of electrodes and sources".to_owned()),
     };
-    let ground = Ground { case, source, solution, driven: &driven, tones, space, lattice, bounds, fallback, motion: true };
+    let ground =
+        Ground { case, source, solution, driven: &driven, tones, space, lattice, bounds, fallback, motion: true };
     // 2. Each group of grains.
     let mut species = Vec::with_capacity(case.grains.len());
     let mut effective = None;

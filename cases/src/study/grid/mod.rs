@@ -42,11 +42,20 @@ struct Grid<'c> {
 }
 
 impl Grid<'_> {
+    /// Width of a wire, or of a bar between holes, m.
+    fn wire(&self) -> f64 {
+        match *self.pattern {
+            GridPattern::Perforated { open, .. } => self.pitch - open,
+            GridPattern::Wires { wire_radius, .. } => 2.0 * wire_radius,
+        }
+    }
+
     /// In its place; nothing without a direction.
     fn placed(&self) -> Option<GridFrame> {
         let frame = self.placement.frame().ok()?;
         let (cell, half_thickness) = (unit_cell(self.pitch, self.pattern), half_thickness(self.pattern));
-        Some(GridFrame { center: self.placement.center, frame, cell, pitch: self.pitch, half_thickness })
+        let (center, pitch, wire) = (self.placement.center, self.pitch, self.wire());
+        Some(GridFrame { center, frame, cell, pitch, wire, half_thickness })
     }
 }
 
@@ -105,13 +114,9 @@ pub fn of_grid(
 ) -> Result<Vec<Number>, Failure> {
     let Some(grid) = grids(case).next() else { return Ok(Vec::new()) };
     let Grid { pitch, pattern, .. } = grid;
-    let wire = match *pattern {
-        GridPattern::Perforated { open, .. } => pitch - open,
-        GridPattern::Wires { wire_radius, .. } => 2.0 * wire_radius,
-    };
     let mut numbers = vec![
         Number::new("pitch", "m", pitch, None),
-        Number::new("wire", "m", wire, None),
+        Number::new("wire", "m", grid.wire(), None),
         Number::new("open_fraction", "", open_fraction(pitch, pattern), None),
     ];
     numbers.extend(light(case, source, &grid)?);
@@ -173,7 +178,8 @@ fn deviation(
     let of = |driven: &Driven, solution: &Solution| sphere(case, &solution.basis.mesh, driven.exact.tree());
     let (Some((center, one)), Some((_, other))) = (of(gridded, solution), of(&plain, solid)) else {
         let key = if case.study.radius.is_some() { "study.radius" } else { "study.center" };
-        let problem = "the ball in which fields are compared reaches a conductor, with the grids or with plates in their place";
+        let problem =
+            "the ball in which fields are compared reaches a conductor, with the grids or with plates in their place";
         let help = "give a center and a radius between the electrodes";
         return Err(source.error_at(key, problem, help).into());
     };

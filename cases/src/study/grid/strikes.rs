@@ -176,5 +176,12 @@ pub fn figure(title: &str, struck: &Struck) -> Option<Figure> {
     let columns = panels.len().min(2);
     let height = 150.0 + 420.0 * panels.len().div_ceil(2) as f64;
     let subtitle = "where on the cell of the grid; its corners are where the middle of the plate is".to_owned();
-    (!panels.is_empty()).then(|| Figure { title: title.to_owned(), subtitle, columns, panels, height, ..Figure::default() })
+    (!panels.is_empty()).then(|| Figure {
+        title: title.to_owned(),
+        subtitle,
+        columns,
+        panels,
+        height,
+        ..Figure::default()
+    })
 }
