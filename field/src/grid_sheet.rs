@@ -11,11 +11,11 @@ use meshes::Vec3;
 
 use crate::{BasisField, Samples};
 
-/// Points of a cell along each side: an average over them is blind to all ripples but the 12th.
-const ACROSS: usize = 12;
+/// Points of a cell along each side: an average over them is blind to all ripples but the 8th.
+const ACROSS: usize = 8;
 
-/// Distances from the plane, in pitches. At the first of them the ripple that an average over a cell cannot take away (the 12th) is
-/// long gone; a parabola through all takes up how the field changes over the trap.
+/// Distances from the plane, in pitches. At the first of them the ripple that an average over a cell cannot take away (the 8th, of a
+/// weave every fourth of a pitch) is below 3e-7; a parabola through all takes up how the field changes over the trap.
 const HEIGHTS: [f64; 5] = [0.6, 0.8, 1.0, 1.2, 1.4];
 
 /// A grid, seen from afar.
@@ -32,20 +32,19 @@ pub struct GridSheet {
     pub uncertainty: f64,
 }
 
-/// δ and τ of a grid, from the unit potential of `channel` about a point of its plane in the middle of the plate; the grid itself is at
-/// 0 V in it. `frame`: the directions along the plate and its normal; `cell`: a rectangle that holds whole cells of the grid, m;
-/// `pitch`: what heights are measured in, m.
+/// δ and τ of a grid in each channel of a field, about a point of its plane in the middle of the plate; of channels in which the grid
+/// itself is not at 0 V only the slopes mean anything. `frame`: the directions along the plate and its normal; `cell`: a rectangle
+/// that holds whole cells of the grid, m; `pitch`: what heights are measured in, m.
 ///
 /// τ is told only where the field comes through on both sides: with equal slopes of different sign it has no part in the potential
 /// and is not a number.
-pub fn grid_sheet(
+pub fn grid_sheets(
     field: &dyn BasisField,
-    channel: usize,
     center: &Vec3,
     frame: &[Vec3; 3],
     cell: [f64; 2],
     pitch: f64,
-) -> GridSheet {
+) -> Vec<GridSheet> {
     let mut points = Vec::new();
     for side in [1.0, -1.0] {
         for height in HEIGHTS {
@@ -61,8 +60,13 @@ pub fn grid_sheet(
     let mut samples = Samples::default();
     field.sample(&points, &mut samples);
     let channels = field.channels();
+    (0..channels).map(|channel| sheet(&samples.potential, channel, channels, pitch)).collect()
+}
+
+/// Of the potentials of the points of [`grid_sheets`].
+fn sheet(potential: &[f64], channel: usize, channels: usize, pitch: f64) -> GridSheet {
     let mean = |from: usize| -> f64 {
-        let sum: f64 = (from..from + ACROSS * ACROSS).map(|p| samples.potential[p * channels + channel]).sum();
+        let sum: f64 = (from..from + ACROSS * ACROSS).map(|p| potential[p * channels + channel]).sum();
         sum / (ACROSS * ACROSS) as f64
     };
     let side = |which: usize| {
@@ -129,8 +133,8 @@ mod tests {
         let wire = (2.0 * PI * r / pitch).ln();
         let field = Wires { pitch, tilt: 30.0 };
         let axes = [Vec3::x(), Vec3::y(), Vec3::z()];
-        let sheet = grid_sheet(&field, 0, &Vec3::zeros(), &axes, [pitch, pitch], pitch);
-        // The 12th ripple at 0.6 pitches is below e^-45; rounding of a fit.
+        let sheet = grid_sheets(&field, &Vec3::zeros(), &axes, [pitch, pitch], pitch)[0];
+        // The 8th ripple at 0.6 pitches is e^-30, an eighth of it in the potential, over π of the slope; a fit makes some times that.
         assert!(sheet.delta.abs() < 1e-12 * pitch);
         assert!(
             (sheet.slopes[0] - (PI / pitch + 30.0)).abs() < 1e-8 && (sheet.slopes[1] + PI / pitch - 30.0).abs() < 1e-8

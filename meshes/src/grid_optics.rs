@@ -25,6 +25,24 @@ pub fn open_fraction(pitch: f64, pattern: &GridPattern) -> f64 {
     }
 }
 
+/// The smallest rectangle along `e1` and `e2` with which a grid repeats, m: two hexagons of a honeycomb, two wires of a weave.
+pub fn unit_cell(pitch: f64, pattern: &GridPattern) -> [f64; 2] {
+    match pattern {
+        GridPattern::Perforated { hole: Hole::Hexagonal, .. } => [pitch, 3.0_f64.sqrt() * pitch],
+        GridPattern::Wires { weave: Weave::Woven, .. } => [2.0 * pitch, 2.0 * pitch],
+        _ => [pitch, pitch],
+    }
+}
+
+/// Half of what a grid takes up along its normal, m; none for a sheet.
+pub fn half_thickness(pattern: &GridPattern) -> f64 {
+    match *pattern {
+        GridPattern::Perforated { thickness, .. } => 0.5 * thickness,
+        GridPattern::Wires { weave: Weave::Parallel, wire_radius } => wire_radius,
+        GridPattern::Wires { wire_radius, .. } => 2.0 * wire_radius,
+    }
+}
+
 /// Rays of light onto a grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Incidence {
@@ -53,24 +71,19 @@ impl GridPatch {
     /// # Errors
     /// A pattern that cannot be.
     pub fn new(pitch: f64, pattern: &GridPattern, angle: f64) -> Result<Self, ShapeError> {
-        let half_thickness = match *pattern {
-            GridPattern::Perforated { thickness, .. } => 0.5 * thickness,
-            GridPattern::Wires { weave: Weave::Parallel, wire_radius } => wire_radius,
-            GridPattern::Wires { wire_radius, .. } => 2.0 * wire_radius,
-        };
         // A little above the plate, so that nothing lies on its surface.
-        let half_thickness = 1.05 * half_thickness + 1e-3 * pitch;
+        let half_thickness = 1.05 * half_thickness(pattern) + 1e-3 * pitch;
         let hexagonal = matches!(pattern, GridPattern::Perforated { hole: Hole::Hexagonal, .. });
         let drift = 2.0 * half_thickness * angle.tan() / pitch;
-        // Whole cells on either side of the one that rays start over; hexagons lose a rim.
-        let around = (drift.ceil() as usize + if hexagonal { 4 } else { 1 }).min(MOST_AROUND);
+        // Whole cells on either side of the one that rays start over; hexagons lose a rim, weaves have cells of two.
+        let around = (drift.ceil() as usize + if hexagonal { 4 } else { 2 }).min(MOST_AROUND);
         let side = (2 * around + 1) as f64 * pitch;
         let shape = Shape::GridPlate { outline: Outline::Rectangle([side, side]), pitch, pattern: *pattern };
         let mesh = SurfaceMesh::assemble([("grid".to_owned(), triangulate(&shape, FINENESS)?)]);
-        let reach = (around as f64 - if hexagonal { 3.0 } else { 0.0 }) * pitch;
+        let reach = (around as f64 - if hexagonal { 3.0 } else { 0.5 }) * pitch;
         Ok(Self {
             tree: SurfaceTree::new(&mesh),
-            cell: [pitch, if hexagonal { 3.0_f64.sqrt() * pitch } else { pitch }],
+            cell: unit_cell(pitch, pattern),
             half_thickness,
             steepest: (reach / (2.0 * half_thickness)).atan(),
         })

@@ -47,7 +47,7 @@ pub mod triangle;
 pub mod triangulate;
 pub mod vtk;
 
-pub use grid_optics::{GridPatch, Incidence, open_fraction};
+pub use grid_optics::{GridPatch, Incidence, half_thickness, open_fraction, unit_cell};
 pub use patch::{Column, Patch, PatchForm, Path, Side, patches};
 pub use profile::{Curve, Joint, Profile, Revolved, revolved};
 pub use report::{ElectrodeReport, MeshReport};

@@ -126,7 +126,8 @@ impl SurfaceTree {
         let mut nodes = Vec::with_capacity(2 * order.len() / LEAF + 1);
         if !order.is_empty() {
             let count = order.len();
-            split(&mut nodes, &corners, &mut order, 0, count);
+            let centroids: Vec<Vec3> = corners.iter().map(|corners| corners.iter().sum::<Vec3>() / 3.0).collect();
+            split(&mut nodes, &corners, &centroids, &mut order, 0, count);
         }
         Self {
             nodes,
@@ -318,7 +319,14 @@ fn size(node: &Node) -> f64 {
 }
 
 /// Splits `order[first..first + count]` at the median of the longest side of its centroids' box, depth first.
-fn split(nodes: &mut Vec<Node>, corners: &[[Vec3; 3]], order: &mut [u32], first: usize, count: usize) {
+fn split(
+    nodes: &mut Vec<Node>,
+    corners: &[[Vec3; 3]],
+    centroids: &[Vec3],
+    order: &mut [u32],
+    first: usize,
+    count: usize,
+) {
     let part = &order[first..first + count];
     let bounds = part.iter().flat_map(|&p| corners[p as usize].iter()).fold(Bounds::EMPTY, |b, v| b.with(v));
     let index = nodes.len();
@@ -326,7 +334,7 @@ fn split(nodes: &mut Vec<Node>, corners: &[[Vec3; 3]], order: &mut [u32], first:
     if count <= LEAF {
         return;
     }
-    let centroid = |p: u32| corners[p as usize].iter().sum::<Vec3>() / 3.0;
+    let centroid = |p: u32| centroids[p as usize];
     let spread = part.iter().fold(Bounds::EMPTY, |b, &p| {
         let c = centroid(p);
         b.union(&Bounds { min: c, max: c })
@@ -336,10 +344,10 @@ fn split(nodes: &mut Vec<Node>, corners: &[[Vec3; 3]], order: &mut [u32], first:
     // Ties are broken by panel number, so that the tree does not depend on the sorting algorithm.
     order[first..first + count]
         .select_nth_unstable_by(half, |&p, &q| centroid(p)[axis].total_cmp(&centroid(q)[axis]).then(p.cmp(&q)));
-    split(nodes, corners, order, first, half);
+    split(nodes, corners, centroids, order, first, half);
     nodes[index].link = nodes.len() as u32;
     nodes[index].count = 0;
-    split(nodes, corners, order, first + half, count - half);
+    split(nodes, corners, centroids, order, first + half, count - half);
 }
 
 /// A stack of node numbers without allocation: the tree is balanced, and 2^32 panels make 32 levels.

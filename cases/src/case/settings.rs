@@ -224,6 +224,8 @@ pub struct Study {
     pub cone: Option<f64>,
     /// How many rays each transparency is told from.
     pub rays: usize,
+    /// How many field lines are followed from each side; `None`: to be chosen.
+    pub lines: Option<usize>,
     /// What a study of grids weighs. Rows do not depend on it.
     #[serde(skip)]
     pub weighing: Weighing,

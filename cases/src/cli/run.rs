@@ -8,7 +8,7 @@ use super::session::Session;
 use crate::checkpoint::{self, CHECKPOINT, Checkpoint, Left};
 use crate::output::summary::TraceSummary;
 use crate::output::{pictures, tracks};
-use crate::pipeline::analysis::brief::brief;
+use crate::pipeline::analysis::trap::traps;
 use crate::pipeline::flights::{Kept, fly, induction, obstacles};
 use crate::pipeline::ready::{flight_region, ready};
 use crate::pipeline::{Failure, Reporter};
@@ -58,7 +58,7 @@ pub(super) fn run(session: &Session, resume: bool, trace: bool) -> Result<(), Fa
         summary.seconds.trace = Some(flights.seconds);
         writing += start.elapsed().as_secs_f64();
     }
-    summary.traps = brief(case, &solution);
+    summary.traps = traps(case, &solution);
     if summary.trace.is_none() {
         summary.trace = Some(TraceSummary::none(&flight_region(case, &solution.basis.mesh)));
         summary.seconds.trace = Some(0.0);

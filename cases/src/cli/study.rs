@@ -18,6 +18,7 @@ use crate::pipeline::{Failure, Reporter, memory};
 use crate::study::figures::figure;
 use crate::study::files::{CSV, JSON, PARQUET, Table, unknown_report};
 use crate::study::front::Front;
+use crate::study::grid::strikes::{self, Book, Struck};
 use crate::study::journal::{JOURNAL, Journal, kept, name};
 use crate::study::points::{Point, Refused, points};
 use crate::study::row::{End, Row};
@@ -55,11 +56,13 @@ pub(super) fn study(mut session: Session, arguments: &StudyArguments) -> Result<
     let mut out = session.output()?;
     let before = if arguments.common.fresh { HashMap::new() } else { kept(&folder) };
     let journal = Journal::open(&folder, arguments.common.fresh)?;
+    let strikes = Book::new(&folder, arguments.common.fresh);
     let work = Work {
         case: &session.case,
         source: &session.source,
         cache: &session.cache,
         journal: &journal,
+        strikes: &strikes,
         reporter: &*session.progress,
         solids: Mutex::default(),
     };
@@ -130,6 +133,10 @@ fn merge(session: &Session, sweep: &Sweep, folders: &[PathBuf], start: Instant) 
     for (key, row) in &found {
         journal.add_named(key, row)?;
     }
+    let book = Book::new(&session.folder, true);
+    for (key, struck) in folders.iter().flat_map(|folder| strikes::kept(folder)) {
+        book.add_named(key, struck)?;
+    }
     finish(session, out, sweep, &rows, tally, None, start)
 }
 
@@ -165,6 +172,13 @@ fn finish(
     };
     if let Some(front) = &front {
         pictures::write(&mut out, "front", &front.figure(&session.title(), sweep, rows))?;
+    }
+    let struck = struck(session, rows);
+    if !struck.is_empty() {
+        out.write(strikes::CSV, |w| strikes::csv(&struck, w))?;
+    }
+    if let Some(figure) = strikes::figure(&session.title(), &struck) {
+        pictures::write(&mut out, "strikes", &figure)?;
     }
     let failed: Vec<&Row> = rows.iter().filter(|row| row.reason().is_some()).collect();
     if let Some(first) = failed.first() {
@@ -214,6 +228,17 @@ fn finish(
         return Err(Failure::run(format!("every point failed: {reason}"), format!("the reasons are in {CSV}")));
     }
     Ok(())
+}
+
+/// Where grains struck grids, for each row that has such.
+fn struck(session: &Session, rows: &[Row]) -> Struck {
+    let mut kept = strikes::kept(&session.folder);
+    if kept.is_empty() {
+        return Vec::new();
+    }
+    let (points, _) = points(&session.case, &session.source);
+    let ours = points.iter().filter(|point| rows.iter().any(|row| row.point == point.number));
+    ours.filter_map(|point| Some((point.number + 1, kept.remove(&name(&point.key))?))).collect()
 }
 
 /// The study in words.

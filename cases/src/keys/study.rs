@@ -26,6 +26,8 @@ pub(crate) struct StudyKeys {
     pub cone: Option<Positive<Angle>>,
     /// How many rays each transparency is told from; left out: 20000.
     pub rays: Option<Count>,
+    /// How many field lines are followed to each grid from both sides; left out: 200 where grains fly, else none.
+    pub lines: Option<Count>,
     /// What light that is lost counts against the deviation of the field over what is tolerated; left out: 1.
     pub weight: Option<Number<Above>>,
     /// Deviation of the field that is tolerated, against the strongest; left out: 0.01.

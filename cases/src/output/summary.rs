@@ -8,7 +8,7 @@ use tracer::{Ensemble, Outcome, Region};
 
 use crate::CaseSource;
 use crate::case::{Case, Drive, GROUND};
-use crate::pipeline::analysis::brief::Brief;
+use crate::pipeline::analysis::trap::Trap;
 use crate::pipeline::flights::Flights;
 use crate::pipeline::memory::people;
 use crate::pipeline::solution::Solution;
@@ -40,7 +40,7 @@ pub struct Summary {
     pub trace: Option<TraceSummary>,
     /// The trap that each group of grains is in, where that is known for little.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub traps: Vec<Brief>,
+    pub traps: Vec<Trap>,
     /// Time that each stage took.
     pub seconds: Seconds,
     /// Most memory that was used, bytes; 0 where the system does not tell.
@@ -486,7 +486,7 @@ impl Summary {
 }
 
 /// A trap in lines for people.
-fn trap_lines(trap: &Brief) -> Vec<(&'static str, String)> {
+fn trap_lines(trap: &Trap) -> Vec<(&'static str, String)> {
     let list = |numbers: &[f64]| numbers.iter().map(|x| format!("{x:.5}")).collect::<Vec<_>>().join(", ");
     // Rounding of a centre is no place.
     let [x, y, z] = trap.center.map(|x| metres(if x.abs() < 1e-12 { 0.0 } else { x }));

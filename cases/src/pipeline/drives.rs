@@ -60,6 +60,16 @@ pub struct Driven {
     pub exact: Arc<PanelSum>,
     /// What each channel is made of: names of electrodes and sources, as `left+right` or `left-right`.
     pub names: Vec<String>,
+    /// Weight of each electrode and source in each channel.
+    pub weights: Vec<Arc<[f64]>>,
+}
+
+impl Driven {
+    /// Volts of each electrode and strength of each source, from volts of each channel.
+    pub fn functions(&self, channels: &[f64]) -> Vec<f64> {
+        let functions = self.weights.first().map_or(0, |row| row.len());
+        (0..functions).map(|f| self.weights.iter().zip(channels).map(|(row, volts)| row[f] * volts).sum()).collect()
+    }
 }
 
 /// The exact field of a case.
@@ -68,7 +78,8 @@ pub fn exact_field(case: &Case, basis: &ElectrodeBasis) -> Driven {
     let names = channel_names(case, &channels.weights);
     let exact = Arc::new(basis.combined(&channels.weights));
     let shared: Arc<dyn BasisField> = exact.clone();
-    Driven { field: DrivenField::new(shared, channels.waveforms), exact, names }
+    let weights = channels.weights.iter().map(|row| Arc::from(&row[..])).collect();
+    Driven { field: DrivenField::new(shared, channels.waveforms), exact, names, weights }
 }
 
 /// The tabulated field of a case, exact where the table does not reach.
@@ -77,7 +88,8 @@ pub fn tabulated_field(case: &Case, basis: &ElectrodeBasis, table: &PotentialTab
     let names = channel_names(case, &channels.weights);
     let field = TabulatedField::combined(basis, table, &channels.weights);
     let exact = Arc::clone(&field.exact);
-    Driven { field: DrivenField::new(Arc::new(field), channels.waveforms), exact, names }
+    let weights = channels.weights.iter().map(|row| Arc::from(&row[..])).collect();
+    Driven { field: DrivenField::new(Arc::new(field), channels.waveforms), exact, names, weights }
 }
 
 /// The voltage of each electrode and the strength of each source at a time, floating electrodes included.

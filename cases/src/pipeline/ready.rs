@@ -91,6 +91,9 @@ pub fn check_starts_again(
     ready: &Ready,
     basis: &ElectrodeBasis,
 ) -> Result<(), Failure> {
+    if ready.ensemble.is_empty() {
+        return Ok(());
+    }
     let bounds = flight_region(case, &basis.mesh);
     check_starts(case, source, &ready.ensemble, &SurfaceTree::new(&basis.mesh), &ready.sources, &bounds)
 }

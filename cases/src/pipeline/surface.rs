@@ -1,7 +1,7 @@
 //! The electrodes of a case as one mesh, and whether they can stand as they do.
 
 use meshes::import::{Format, ImportedMesh as Imported};
-use meshes::{Shape, SurfaceMesh, SurfaceTree, Triangulation, triangulate, triangulate_to};
+use meshes::{Shape, SurfaceMesh, SurfaceTree, Triangulation, Vec3, triangulate, triangulate_to};
 
 use super::{Failure, Reporter};
 use crate::case::{Case, Drive, ElectrodeShape, GROUND, ImportedMesh, MeshFormat};
@@ -179,12 +179,25 @@ fn import(
 
 /// Closed electrodes that hold others are hollow, unless the case says what they are.
 fn find_hollow(mesh: &mut SurfaceMesh, case: &Case, source: &CaseSource) -> Result<(), Failure> {
-    let tree = SurfaceTree::new(mesh);
     let mut holds: Vec<Option<usize>> = vec![None; case.electrodes.len()];
+    // Most electrodes stand beside each other: boxes tell that at once.
+    let boxes: Vec<(Vec3, Vec3)> = (0..case.electrodes.len())
+        .map(|e| {
+            let corners = mesh.panels_of(e).flat_map(|p| mesh.corners(p));
+            let none = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+            corners.fold(none, |(low, high), corner| (low.inf(&corner), high.sup(&corner)))
+        })
+        .collect();
+    let in_box = |e: usize, p: &Vec3| mesh.electrodes[e].closed && boxes[e].0 <= *p && *p <= boxes[e].1;
+    let mut tree = None;
     for inner in 0..case.electrodes.len() {
         // Electrodes that cut each other are found later: one point tells for those that do not.
         let Some(panel) = mesh.panels_of(inner).next() else { continue };
-        for outer in tree.enclosed_by(&mesh.centroid(panel)) {
+        let point = mesh.centroid(panel);
+        if !(0..case.electrodes.len()).any(|outer| outer != inner && in_box(outer, &point)) {
+            continue;
+        }
+        for outer in tree.get_or_insert_with(|| SurfaceTree::new(mesh)).enclosed_by(&point) {
             if outer != inner {
                 holds[outer].get_or_insert(inner);
             }

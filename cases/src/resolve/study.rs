@@ -31,6 +31,7 @@ pub(super) fn study(at: &At, keys: &StudyKeys) -> Result<Study, CaseError> {
         angles,
         cone,
         rays: keys.rays.map_or(RAYS, |rays| rays.count()),
+        lines: keys.lines.map(|lines| lines.count()),
         weighing: Weighing {
             weight: keys.weight.map_or(1.0, |weight| weight.value),
             tolerated: keys.tolerated.map_or(TOLERATED, |tolerated| tolerated.value),

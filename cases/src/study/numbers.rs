@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use field::zonal::HIGHEST;
 use field::{Waveform, WaveformPart, Zonal, zonal};
-use meshes::{SurfaceTree, Vec3};
+use meshes::{SurfaceMesh, SurfaceTree, Vec3};
 use tracer::Outcome;
 
 use super::row::Number;
@@ -59,11 +59,9 @@ pub fn of_field(case: &Case, solution: &Solution) -> Vec<Number> {
 }
 
 /// Where multipoles are told: the centre and the radius of the sphere. `None` where it would lie in a conductor.
-pub fn sphere(case: &Case, solution: &Solution) -> Option<(Vec3, f64)> {
-    let mesh = &solution.basis.mesh;
+pub fn sphere(case: &Case, mesh: &SurfaceMesh, tree: &SurfaceTree) -> Option<(Vec3, f64)> {
     let region = region::trap_box(case, mesh);
     let center = case.study.center.unwrap_or((region.min + region.max) * 0.5);
-    let tree = SurfaceTree::new(mesh);
     if tree.inside(&center).is_some() {
         return None;
     }
@@ -83,8 +81,8 @@ pub fn sphere(case: &Case, solution: &Solution) -> Option<(Vec3, f64)> {
 ///
 /// since |δφ| ≤ ε E r relative to the centre and the mean of |P_l| is at most 1/√(2l + 1).
 fn multipoles(case: &Case, solution: &Solution) -> Vec<Number> {
-    let Some((center, radius)) = sphere(case, solution) else { return Vec::new() };
     let driven = exact_field(case, &solution.basis);
+    let Some((center, radius)) = sphere(case, &solution.basis.mesh, driven.exact.tree()) else { return Vec::new() };
     let of = zonal(&**driven.field.basis(), &center, &case.study.axis, radius);
     let waveforms = driven.field.waveforms();
     let constant: Vec<f64> = waveforms.iter().map(|waveform| waveform.constant).collect();

@@ -29,7 +29,7 @@ pub struct Refused {
 }
 
 /// Raised when the same case gives other rows than before.
-const EDITION: u32 = 1;
+const EDITION: u32 = 2;
 
 /// The case at a point of its sweep.
 ///

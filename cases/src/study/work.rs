@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use rayon::prelude::*;
 
 use super::grid;
+use super::grid::strikes::{Book, Strike};
 use super::journal::{Journal, usable};
 use super::numbers;
 use super::points::{Point, Refused, case_at};
@@ -68,6 +69,8 @@ pub struct Work<'a> {
     pub cache: &'a Cache,
     /// Where rows are kept.
     pub journal: &'a Journal,
+    /// Where strikes on grids are kept.
+    pub strikes: &'a Book,
     /// Who is told how far the work is.
     pub reporter: &'a dyn Reporter,
     /// What was solved with plates in place of grids.
@@ -220,7 +223,8 @@ impl Work<'_> {
                     .with_max_len(1)
                     .map(|standing| {
                         let key = standing.point.key;
-                        let row = row(standing, solution, compared.as_deref(), tabulated);
+                        let (row, struck) = row(standing, solution, compared.as_deref(), tabulated);
+                        self.strikes.add(&key, struck)?;
                         self.journal.add(&key, &row)?;
                         done();
                         Ok(row)
@@ -324,18 +328,23 @@ fn planned(standing: Standing, solution: &Solution) -> Result<Standing, Fallen> 
     }
 }
 
-/// Flies the grains of a point, if it has any, and reports.
-fn row(standing: Standing, solution: &Solution, solid: Option<&Solution>, tabulated: Option<&Tabulated>) -> Row {
+/// Flies the grains of a point, if it has any, and reports; with the strikes on grids, where the study is one of those.
+fn row(
+    standing: Standing,
+    solution: &Solution,
+    solid: Option<&Solution>,
+    tabulated: Option<&Tabulated>,
+) -> (Row, Vec<Strike>) {
     let quiet: Arc<Quiet> = Arc::default();
     let worked = worked(&standing, solution, solid, tabulated, &quiet);
     let mut warnings = solution.warnings.clone();
     warnings.extend(standing.warnings);
     warnings.extend(quiet.said());
-    let end = match worked {
-        Ok(numbers) => End::Done(numbers),
-        Err(failure) => End::of(&failure),
+    let (end, struck) = match worked {
+        Ok((numbers, struck)) => (End::Done(numbers), struck),
+        Err(failure) => (End::of(&failure), Vec::new()),
     };
-    Row { point: standing.point.number, values: standing.point.values, end, warnings }
+    (Row { point: standing.point.number, values: standing.point.values, end, warnings }, struck)
 }
 
 fn worked(
@@ -344,11 +353,12 @@ fn worked(
     solid: Option<&Solution>,
     tabulated: Option<&Tabulated>,
     quiet: &Arc<Quiet>,
-) -> Result<Vec<Number>, Failure> {
+) -> Result<(Vec<Number>, Vec<Strike>), Failure> {
     let case = &standing.case;
     let mut numbers = numbers::of_field(case, solution);
+    let mut struck = Vec::new();
     if let Some(solid) = solid {
-        numbers.extend(grid::of_grid(case, &standing.source, solution, solid)?);
+        numbers.extend(grid::of_grid(case, &standing.source, solution, solid, tabulated, &**quiet)?);
     }
     if let Some(tabulated) = tabulated {
         tabulated.warn_if_missed(case, &**quiet);
@@ -357,10 +367,11 @@ fn worked(
             numbers.extend(numbers::of_flights(case, &flights));
             if solid.is_some() {
                 numbers.extend(grid::of_grains(case, &standing.ready.ensemble, &flights));
+                struck = grid::strikes::strikes(case, &flights);
             }
         }
     }
-    Ok(numbers)
+    Ok((numbers, struck))
 }
 
 fn flights(

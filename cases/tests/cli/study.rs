@@ -272,6 +272,21 @@ sampling = "zip"
     assert!(number(&rows[0], "field_deviation_max") > number(&rows[1], "field_deviation_max"));
     assert_eq!(json["front"]["front"], serde_json::json!([2, 1]));
     assert!(Path::new(&scratch.at("out")).join("front.png").is_file());
+    // Every strike has its row, on a bar of the cell whose corner is the middle of a hole.
+    let csv = String::from_utf8(file(&scratch.at("out"), "strikes.csv")).unwrap();
+    let caught: f64 = rows.iter().map(|row| 100.0 * number(row, "grains_caught")).sum();
+    assert_eq!(csv.lines().count(), 1 + caught.round() as usize);
+    for line in csv.lines().filter(|line| line.starts_with("1,")) {
+        let cell: Vec<f64> = line.split(',').skip(6).take(2).map(|x| x.parse().unwrap()).collect();
+        assert!(cell.iter().any(|x| (x - 0.5).abs() < 0.1 + 1e-9), "{line}");
+    }
+    // Rows and strikes are joined from the folder of the study without any work.
+    let joined = scratch.at("joined");
+    let again = study(&case, &joined, &["--merge", &scratch.at("out")]).done().json();
+    assert_eq!(again["solved"].as_u64(), Some(0));
+    for name in ["study.csv", "front.png", "strikes.csv", "strikes.png"] {
+        assert_eq!(file(&scratch.at("out"), name), file(&joined, name), "{name}");
+    }
     // A case without a grid.
     let said = graintrap(&[
         "study",
@@ -282,4 +297,76 @@ sampling = "zip"
         &scratch.at("no"),
     ]);
     assert!(said.err.contains("study.kind: the case has no grid to study"), "{}", said.err);
+}
+
+#[test]
+fn cli_study_follows_lines_through_wires() {
+    let scratch = Scratch::new();
+    // Seven wires of r/s = 0.1 half way between plates; no grains, one solution for all voltages.
+    let text = r#"
+[[electrode]]
+name        = "grid"
+shape       = "grid_plate"
+size        = [7, 7]
+pitch       = 1
+wires       = "parallel"
+wire_radius = 0.1
+
+[[electrode]]
+name   = "top"
+shape  = "plate"
+size   = [9, 9]
+center = [0, 0, 2]
+dc     = 1
+
+[[electrode]]
+name   = "bottom"
+shape  = "plate"
+size   = [9, 9]
+center = [0, 0, -2]
+
+[field]
+accuracy = 1e-2
+
+[table]
+min = [-1.5, -1.5, -1.5]
+max = [1.5, 1.5, 1.5]
+
+[study]
+kind   = "grid_transparency"
+center = [0, 0, 1]
+radius = 0.5
+rays   = 100
+lines  = 300
+
+[sweep]
+"electrode.bottom.dc" = [-1, -3, -4.6]
+"#;
+    let case = scratch.file("wires.toml", text);
+    let json = study(&case, &scratch.at("out"), &[]).done().json();
+    assert_eq!((json["solved"].as_u64(), json["failed"].as_u64()), (Some(2), Some(0)));
+    let rows = json["rows"].as_array().unwrap();
+    // Equal fields on both sides: 38.714 % of the lines end on endless wires (potential theory of the lattice). Even points miss each
+    // of two edges by up to 1/300.
+    for side in ["above", "below"] {
+        let caught = number(&rows[0], &format!("lines_caught.{side}"));
+        assert!((caught - 0.387_14).abs() < 0.01, "{side}: {caught}");
+        assert!((caught + number(&rows[0], &format!("lines_passed.{side}")) - 1.0).abs() < 1e-12);
+    }
+    // All lines of the weaker side come through from a ratio of 3.66602 on.
+    for row in &rows[1..] {
+        let ratio = number(row, "field_below") / number(row, "field_above");
+        let caught = number(row, "lines_caught.above");
+        println!("ratio {ratio:.4}: {caught} caught");
+        assert!((ratio - 3.666).abs() > 0.1 && (caught == 0.0) == (ratio > 3.666), "{ratio}: {caught}");
+        // As many lines pass from below as above has.
+        let passed = number(row, "lines_passed.below");
+        assert!((passed - (1.0 - caught) / ratio).abs() < 0.01, "{passed} of 1/{ratio}");
+    }
+    // Wires of tests/reference/grid_plate.json, r/d = 0.1, to 1 %.
+    let delta = number(&rows[0], "delta");
+    assert!((delta / 0.073_874_505 - 1.0).abs() < 1e-2, "{delta}");
+    // The ripple of the field of charged wires, 2 e^(-2πz/d) of half the jump, is 1 % of it some 0.8 pitches away.
+    let depth = number(&rows[0], "ripple_above");
+    assert!((0.3..1.0).contains(&depth), "{depth}");
 }

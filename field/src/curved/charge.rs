@@ -20,6 +20,9 @@ const OFF_EDGE: f64 = 1e-3;
 /// 1e-3 of an element from it; at this distance it is 1e-3, and the density itself changes by less.
 const OFF_AXIS: f64 = 0.03;
 
+/// Patches in which a point is looked for before all near ones are compared: of a plate of 48 x 48 holes the first three hold 95 of 100.
+const TRIED: usize = 4;
+
 /// Charges on a curved mesh, for each basis function.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CurvedCharge {
@@ -85,8 +88,29 @@ impl CurvedCharge {
         let clusters = Clusters::new(&balls.iter().map(|b| (b.center, b.reach)).collect::<Vec<_>>(), 8);
         // The patch whose surface is nearest; patches reach some 1.5 of their ball where they bend.
         let least = |p: u32, point: &Vec3| (point - balls[p as usize].center).norm() - 1.5 * balls[p as usize].reach;
+        // Most points of flat faces lie in the midst of a patch, one of the few whose middle is nearest in terms of their size: no other
+        // can be as near.
+        let within = |candidates: &[u32], point: &Vec3| -> Option<(usize, [f64; 2])> {
+            let away = |p: u32| (point - balls[p as usize].center).norm() / balls[p as usize].reach;
+            let mut tried = f64::NEG_INFINITY;
+            for _ in 0..TRIED {
+                let untried = candidates.iter().map(|&p| (away(p), p)).filter(|(a, _)| *a > tried);
+                let (next, p) = untried.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))?;
+                tried = next;
+                let (patch, reach) = (&mesh.patches[p as usize], balls[p as usize].reach);
+                let at = patch.parameters(point);
+                let inner = at.iter().all(|x| (1e-6..1.0 - 1e-6).contains(x));
+                if inner && (patch.at(at[0], at[1]) - point).norm() < 1e-9 * reach {
+                    return Some((p as usize, at));
+                }
+            }
+            None
+        };
         let nearest = |candidates: &mut Vec<u32>, point: &Vec3, electrode: usize| -> Option<(usize, [f64; 2])> {
             candidates.retain(|&p| mesh.electrode[p as usize] as usize == electrode);
+            if let Some(found) = within(candidates, point) {
+                return Some(found);
+            }
             candidates.sort_by(|a, b| least(*a, point).total_cmp(&least(*b, point)).then(a.cmp(b)));
             let mut best: Option<(f64, u32, [f64; 2])> = None;
             for &p in &*candidates {

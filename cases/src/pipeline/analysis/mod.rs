@@ -4,6 +4,7 @@ pub mod brief;
 pub mod chart;
 pub mod report;
 mod species;
+pub mod trap;
 mod wish;
 
 use std::sync::Arc;
@@ -51,6 +52,8 @@ struct Ground<'a> {
     bounds: Region,
     /// Where no effective potential says what the centre is.
     fallback: (Vec3, String),
+    /// Whether the motion about equilibria is looked at.
+    motion: bool,
 }
 
 /// How much of the largest multipole a smaller one must be on the sphere to be listed.
@@ -114,7 +117,8 @@ pub fn analyse(
         (None, Some(null)) => (null.position, "the null of the static field nearest to the middle".to_owned()),
         (None, None) => (middle, "the middle of electrodes and sources".to_owned()),
     };
-    let ground = Ground { case, source, solution, driven: &driven, tones, space, lattice, bounds, fallback };
+    let ground =
+        Ground { case, source, solution, driven: &driven, tones, space, lattice, bounds, fallback, motion: true };
     // 2. Each group of grains.
     let mut species = Vec::with_capacity(case.grains.len());
     let mut effective = None;

@@ -79,7 +79,7 @@ pub(super) fn species(
     // 3. The motion about the equilibrium.
     let frequencies: Vec<f64> = ground.tones.tones.iter().map(|t| t.frequency).collect();
     let period = common_period(&frequencies);
-    if specific != 0.0 && (period.is_some() || frequencies.is_empty()) {
+    if ground.motion && specific != 0.0 && (period.is_some() || frequencies.is_empty()) {
         let near = Neighbourhood {
             expansion: &expansion,
             waveforms: ground.driven.field.waveforms(),

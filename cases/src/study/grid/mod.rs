@@ -1,17 +1,25 @@
 //! What a grid does to light, to the field and to grains, against a plate in its place.
 
-use field::{BasisField, Samples, grid_sheet, zonal};
-use meshes::{GridPatch, GridPattern, Hole, Incidence, Outline, Placement, Shape, Vec3, open_fraction};
+mod far;
+mod near;
+pub mod strikes;
+mod trap;
+
+use field::{GridFrame, Samples, zonal};
+use meshes::{
+    GridPatch, GridPattern, Incidence, Outline, Placement, Shape, Vec3, half_thickness, open_fraction, unit_cell,
+};
 use tracer::{Ensemble, Outcome, wilson};
 
 use super::numbers::{amplitudes, sphere};
 use super::row::Number;
 use crate::CaseSource;
 use crate::case::{Case, ElectrodeShape};
-use crate::pipeline::Failure;
 use crate::pipeline::drives::{Driven, exact_field};
 use crate::pipeline::flights::Flights;
 use crate::pipeline::solution::Solution;
+use crate::pipeline::tables::Tabulated;
+use crate::pipeline::{Failure, Reporter};
 
 /// Points of the trap region in which fields are compared.
 const COMPARED: usize = 300;
@@ -19,12 +27,36 @@ const COMPARED: usize = 300;
 /// Standard deviations of the intervals that are told: 95 of 100 hold the truth.
 const SIGMAS: f64 = 1.96;
 
+/// A deviation this many times its error is told without a warning.
+const RESOLVED: f64 = 3.0;
+
+/// Field lines that are followed on each side where grains fly and the study does not say how many: known to 3 %.
+const LINES: usize = 200;
+
 /// A grid of a case.
 struct Grid<'c> {
     electrode: usize,
     placement: &'c Placement,
     pitch: f64,
     pattern: &'c GridPattern,
+}
+
+impl Grid<'_> {
+    /// Width of a wire, or of a bar between holes, m.
+    fn wire(&self) -> f64 {
+        match *self.pattern {
+            GridPattern::Perforated { open, .. } => self.pitch - open,
+            GridPattern::Wires { wire_radius, .. } => 2.0 * wire_radius,
+        }
+    }
+
+    /// In its place; nothing without a direction.
+    fn placed(&self) -> Option<GridFrame> {
+        let frame = self.placement.frame().ok()?;
+        let (cell, half_thickness) = (unit_cell(self.pitch, self.pattern), half_thickness(self.pattern));
+        let (center, pitch, wire) = (self.placement.center, self.pitch, self.wire());
+        Some(GridFrame { center, frame, cell, pitch, wire, half_thickness })
+    }
 }
 
 fn grids(case: &Case) -> impl Iterator<Item = Grid<'_>> {
@@ -67,30 +99,36 @@ pub fn with_plates(case: &Case, source: &CaseSource) -> Result<Case, Failure> {
     Err(source.error_at("study.kind", "the case has no grid to study", help).into())
 }
 
-/// Light, field and sheet of the first grid of a case, and how far the field of the trap is from that of plates.
+/// Light, field and sheet of the first grid of a case, and how far the trap is from that with plates. `tabulated` is the field in
+/// which grains fly, where they do.
 ///
 /// # Errors
-/// A pattern that cannot be.
+/// A pattern that cannot be, a trap that cannot be analysed.
 pub fn of_grid(
     case: &Case,
     source: &CaseSource,
     solution: &Solution,
     solid: &Solution,
+    tabulated: Option<&Tabulated>,
+    reporter: &dyn Reporter,
 ) -> Result<Vec<Number>, Failure> {
     let Some(grid) = grids(case).next() else { return Ok(Vec::new()) };
     let Grid { pitch, pattern, .. } = grid;
-    let wire = match *pattern {
-        GridPattern::Perforated { open, .. } => pitch - open,
-        GridPattern::Wires { wire_radius, .. } => 2.0 * wire_radius,
-    };
     let mut numbers = vec![
         Number::new("pitch", "m", pitch, None),
-        Number::new("wire", "m", wire, None),
+        Number::new("wire", "m", grid.wire(), None),
         Number::new("open_fraction", "", open_fraction(pitch, pattern), None),
     ];
     numbers.extend(light(case, source, &grid)?);
-    numbers.extend(sheet(solution, &grid));
-    numbers.extend(deviation(case, solution, solid));
+    let gridded = exact_field(case, &solution.basis);
+    if let Some(placed) = grid.placed() {
+        numbers.extend(far::sheet(solution, &gridded, grid.electrode, &placed));
+        numbers.extend(near::ripple(solution, &gridded, &placed));
+        let lines = case.study.lines.unwrap_or(if tabulated.is_some() { LINES } else { 0 });
+        numbers.extend(near::lines(&gridded, grid.electrode, &placed, lines));
+    }
+    numbers.extend(deviation(case, source, solution, &gridded, solid, reporter)?);
+    numbers.extend(trap::shifts(case, source, solution, solid, tabulated, reporter)?);
     Ok(numbers)
 }
 
@@ -118,26 +156,6 @@ fn tidy(name: &str) -> String {
     format!("{}deg", number.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// The grid from afar, in the unit potential that crosses it most.
-fn sheet(solution: &Solution, grid: &Grid) -> Vec<Number> {
-    let Ok(frame) = grid.placement.frame() else { return Vec::new() };
-    let hexagonal = matches!(grid.pattern, GridPattern::Perforated { hole: Hole::Hexagonal, .. });
-    let cell = [grid.pitch, if hexagonal { 3.0_f64.sqrt() * grid.pitch } else { grid.pitch }];
-    let basis = solution.basis.panel_sum();
-    let of = |function: usize| grid_sheet(&basis, function, &grid.placement.center, &frame, cell, grid.pitch);
-    let across = |slopes: [f64; 2]| (slopes[0] - slopes[1]).abs();
-    let others = (0..basis.channels()).filter(|function| *function != grid.electrode).map(of);
-    let Some(sheet) = others.max_by(|a, b| across(a.slopes).total_cmp(&across(b.slopes))) else { return Vec::new() };
-    // A potential that is off by what the field is, along a pitch from the grid.
-    let strongest = sheet.slopes[0].abs().max(sheet.slopes[1].abs());
-    let error = solution.errors.field * strongest * grid.pitch / across(sheet.slopes) + sheet.uncertainty;
-    vec![
-        Number::new("delta", "m", sheet.delta, error),
-        Number::new("tau", "m", sheet.tau, 4.0 * error),
-        Number::new("leakage", "m", sheet.delta + 0.25 * sheet.tau, 2.0 * error),
-    ]
-}
-
 /// What the RF, or where there is none the constant voltages, multiply each channel by.
 fn weights(driven: &Driven) -> Vec<f64> {
     let waveforms = driven.field.waveforms();
@@ -145,12 +163,27 @@ fn weights(driven: &Driven) -> Vec<f64> {
 }
 
 /// How far the field of the trap is from that with plates, within the sphere that multipoles are told of.
-fn deviation(case: &Case, solution: &Solution, solid: &Solution) -> Vec<Number> {
-    let (Some((center, one)), Some((_, other))) = (sphere(case, solution), sphere(case, solid)) else {
-        return Vec::new();
+///
+/// # Errors
+/// There is no such sphere.
+fn deviation(
+    case: &Case,
+    source: &CaseSource,
+    solution: &Solution,
+    gridded: &Driven,
+    solid: &Solution,
+    reporter: &dyn Reporter,
+) -> Result<Vec<Number>, Failure> {
+    let plain = exact_field(case, &solid.basis);
+    let of = |driven: &Driven, solution: &Solution| sphere(case, &solution.basis.mesh, driven.exact.tree());
+    let (Some((center, one)), Some((_, other))) = (of(gridded, solution), of(&plain, solid)) else {
+        let key = if case.study.radius.is_some() { "study.radius" } else { "study.center" };
+        let problem =
+            "the ball in which fields are compared reaches a conductor, with the grids or with plates in their place";
+        let help = "give a center and a radius between the electrodes";
+        return Err(source.error_at(key, problem, help).into());
     };
     let radius = one.min(other);
-    let (gridded, plain) = (exact_field(case, &solution.basis), exact_field(case, &solid.basis));
     let points = ball(&center, radius);
     let field = |driven: &Driven| -> Vec<Vec3> {
         let mut samples = Samples::default();
@@ -159,28 +192,33 @@ fn deviation(case: &Case, solution: &Solution, solid: &Solution) -> Vec<Number> 
         let sum = |gradients: &[Vec3]| gradients.iter().zip(&weights).map(|(g, w)| g * *w).sum();
         samples.gradient.chunks(basis.channels()).map(sum).collect()
     };
-    let (with, without) = (field(&gridded), field(&plain));
+    let (with, without) = (field(gridded), field(&plain));
     let strongest = without.iter().map(|e| e.norm()).fold(f64::MIN_POSITIVE, f64::max);
     let apart = || with.iter().zip(&without).map(|(a, b)| (a - b).norm() / strongest);
     let largest = apart().fold(0.0, f64::max);
     let rms = (apart().map(|x| x * x).sum::<f64>() / points.len() as f64).sqrt();
     let error = solution.errors.field + solid.errors.field;
+    if largest < RESOLVED * error {
+        reporter.warning(&format!(
+            "the deviation of the field ({largest:.1e}) is not much larger than its error ({error:.1e}): ask for a smaller field.accuracy, in the region that matters ([table] min and max)"
+        ));
+    }
     let a = |driven: &Driven| -> Vec<f64> {
         let of = zonal(&**driven.field.basis(), &center, &case.study.axis, radius);
         let weights = weights(driven);
         (0..=4).map(|l| of.coefficients.iter().zip(&weights).map(|(a, w)| a[l] * w).sum()).collect()
     };
-    let (a, b) = (a(&gridded), a(&plain));
+    let (a, b) = (a(gridded), a(&plain));
     // Relative to the quadrupole on the sphere; errors as for multipoles, of both fields.
     let quadrupole = b[2].abs() * radius * radius;
     let share = error * strongest * radius;
-    vec![
+    Ok(vec![
         Number::new("field_deviation_max", "", largest, error),
         Number::new("field_deviation_rms", "", rms, error),
         Number::new("A0_shift", "V", a[0] - b[0], share),
         Number::new("A2_shift", "", a[2] / b[2] - 1.0, 5.0_f64.sqrt() * share / quadrupole),
         Number::new("A4_shift", "", (a[4] - b[4]) * radius.powi(4) / quadrupole, 3.0 * share / quadrupole),
-    ]
+    ])
 }
 
 /// Points spread evenly over a ball.
@@ -207,14 +245,19 @@ pub fn of_grains(case: &Case, starts: &Ensemble, flights: &Flights) -> Vec<Numbe
         }
     }
     let all = endings.len();
-    let told = |name: &str, count: usize| {
-        let [low, high] = wilson(count, all, SIGMAS);
-        [
-            Number::new(name, "", count as f64 / all as f64, 0.5 * (high - low)),
-            Number::new(format!("{name}_low"), "", low, None),
-            Number::new(format!("{name}_high"), "", high, None),
-        ]
-    };
-    [told("grains_passed", passed), told("grains_caught", caught), told("grains_turned", all - passed - caught)]
-        .concat()
+    let turned = all - passed - caught;
+    [("grains_passed", passed), ("grains_caught", caught), ("grains_turned", turned)]
+        .into_iter()
+        .flat_map(|(name, count)| fraction(name, count, all))
+        .collect()
+}
+
+/// A fraction with the ends of its interval of 95 % (Wilson).
+fn fraction(name: &str, count: usize, all: usize) -> [Number; 3] {
+    let [low, high] = wilson(count, all, SIGMAS);
+    [
+        Number::new(name, "", count as f64 / all as f64, 0.5 * (high - low)),
+        Number::new(format!("{name}_low"), "", low, None),
+        Number::new(format!("{name}_high"), "", high, None),
+    ]
 }
