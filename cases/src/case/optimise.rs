@@ -41,6 +41,8 @@ pub struct Varied {
     pub range: [f64; 2],
     /// Where the search starts, in the unit.
     pub start: f64,
+    /// Only whole steps above the least value, in the unit.
+    pub step: Option<f64>,
     /// Empty for pure numbers.
     pub unit: String,
     /// Equal ratios count alike.
@@ -103,6 +105,21 @@ impl Asked {
 impl Varied {
     /// The value at a place from 0 to 1 of the range.
     pub fn at(&self, place: f64) -> f64 {
+        let value = self.between(place);
+        let [from, to] = self.range;
+        match self.step {
+            None => value,
+            Some(step) => {
+                // A bound that is no whole number of steps away is out of reach.
+                let steps = ((value - from) / step).round().min(((to - from) / step * (1.0 + 1e-12)).floor());
+                // Digits of sums of decimal fractions that nobody wrote.
+                let value = from + steps * step;
+                format!("{value:.12e}").parse().unwrap_or(value)
+            }
+        }
+    }
+
+    fn between(&self, place: f64) -> f64 {
         let [from, to] = self.range;
         match place.clamp(0.0, 1.0) {
             // The bounds exactly as written.

@@ -55,7 +55,8 @@ pub(super) fn optimise(mut session: Session, arguments: &StudyArguments) -> Resu
     pictures::write(&mut out, "study", &parameters(&title, &optimise, &outcome))?;
     let figures = figures(&optimise, &outcome);
     if let Some(row) = outcome.best.map(|n| &outcome.rows[n]) {
-        let comment = format!("# {}\n#\n{}", title, figures.lines().map(|line| format!("# {line}\n")).collect::<String>());
+        let comment =
+            format!("# {}\n#\n{}", title, figures.lines().map(|line| format!("# {line}\n")).collect::<String>());
         let text = best(&session.case, &session.source, &optimise, &row.values, &comment).map_err(|problem| {
             let help = format!("the values are in {CSV}; report this as a defect");
             Failure::run(format!("{BEST} cannot be made: {problem}"), help)
@@ -138,11 +139,19 @@ fn figures(optimise: &Optimise, outcome: &Outcome) -> String {
     let _ = writeln!(text, "objective    {}, {goal}", optimise.objective.text);
     if let (Some((value, error)), Some(best)) = (outcome.objective, outcome.best) {
         let within = if error > 0.0 { format!(" within {error:.1e}") } else { String::new() };
-        let _ = writeln!(text, "best         {value:.9}{within}, evaluation {} of {}", best + 1, outcome.rows.len());
+        let _ =
+            writeln!(text, "best         {}{within}, evaluation {} of {}", digits(value), best + 1, outcome.rows.len());
         let row = &outcome.rows[best];
         for (varied, value) in optimise.varied.iter().zip(&row.values) {
             let bounds = varied.range.map(|x| varied.written(x).trim_matches('"').to_owned());
-            let _ = writeln!(text, "             {} = {} (from {} to {})", varied.key, value.trim_matches('"'), bounds[0], bounds[1]);
+            let _ = writeln!(
+                text,
+                "             {} = {} (from {} to {})",
+                varied.key,
+                value.trim_matches('"'),
+                bounds[0],
+                bounds[1]
+            );
         }
     }
     let converged = if outcome.converged {
@@ -156,4 +165,14 @@ fn figures(optimise: &Optimise, outcome: &Outcome) -> String {
     let active = if outcome.active.is_empty() { "nothing".to_owned() } else { outcome.active.join(", ") };
     let _ = writeln!(text, "held back by {active}");
     text
+}
+
+/// A number in nine digits.
+fn digits(x: f64) -> String {
+    if x == 0.0 || (1e-3..1e7).contains(&x.abs()) {
+        let places = (8 - x.abs().max(1e-9).log10().floor() as i32).clamp(0, 12) as usize;
+        let text = format!("{x:.places$}");
+        return if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text };
+    }
+    format!("{x:.8e}")
 }

@@ -71,6 +71,8 @@ pub(crate) struct VaryKeys {
     pub to: End,
     /// Where the search starts, in the same unit; left out: in the middle.
     pub start: Option<End>,
+    /// Only `from` and whole steps above it, as can be made; left out: any value.
+    pub step: Option<End>,
     /// Whether equal differences or equal ratios count alike; left out: "linear".
     pub scale: Option<Scale>,
 }

@@ -16,33 +16,53 @@ const MOST_EVALUATIONS: usize = 100_000;
 /// What is optimised, if anything is, and the numbers that the study takes.
 pub(super) fn optimise(at: &At, keys: &StudyKeys, case: &Case) -> Result<(Option<Optimise>, Asked), CaseError> {
     if case.study.kind != StudyKind::Optimise {
-        let only = ["objective", "goal", "constraints", "vary", "tie", "evaluations", "tolerance", "optimiser", "starts", "seed"];
+        let only = [
+            "objective",
+            "goal",
+            "constraints",
+            "vary",
+            "tie",
+            "evaluations",
+            "tolerance",
+            "optimiser",
+            "starts",
+            "seed",
+        ];
         if let Some(key) = only.iter().find(|key| at.key(key).written()) {
             let help = "write kind = \"optimise\" in [study], or leave this out";
             return Err(at.key(key).key_error("only an optimisation has this key", help));
         }
         let report = case.sweep.iter().flat_map(|sweep| &sweep.report);
         let grids = case.study.kind == StudyKind::GridTransparency;
-        return Ok((None, Asked { grids, ..asked(case, report.map(String::as_str), true) }));
+        // A sweep that names no number of its flights does without them.
+        let all = case.sweep.as_ref().is_none_or(|sweep| sweep.report.is_empty());
+        return Ok((None, Asked { grids, ..asked(case, report.map(String::as_str), all) }));
     }
     if case.sweep.is_some() {
         let help = "leave [sweep] out, or write kind = \"sweep\" in [study]";
         return Err(At::root(at.source).key("sweep").key_error("an optimisation varies what [study.vary] says", help));
     }
     if keys.vary.is_empty() {
-        let help = "add [study.vary] with a line such as \"electrode.ring.radius\" = { from = \"5 mm\", to = \"20 mm\" }";
+        let help =
+            "add [study.vary] with a line such as \"electrode.ring.radius\" = { from = \"5 mm\", to = \"20 mm\" }";
         return Err(at.missing("vary", "an optimisation has to vary something", help));
     }
     let ties = ties(&at.key("tie"), keys)?;
-    let varied: Vec<Varied> =
-        keys.vary.iter().map(|(key, keys)| varied(&at.key("vary").key(key), key, keys, &ties)).collect::<Result<_, _>>()?;
+    let varied: Vec<Varied> = keys
+        .vary
+        .iter()
+        .map(|(key, keys)| varied(&at.key("vary").key(key), key, keys, &ties))
+        .collect::<Result<_, _>>()?;
     let known = Known { names: names(case), varied: &varied };
     for tie in &ties {
         for name in tie.value.names() {
             if !varied.iter().any(|varied| varied.key == *name) {
                 let all: Vec<String> = varied.iter().map(|varied| varied.key.clone()).collect();
                 let help = format!("what [study.vary] varies can be used: {}", all.join(", "));
-                return Err(at.key("tie").key(&tie.key).error(format!("{{value}} uses `{name}`, which is not varied"), help));
+                return Err(at
+                    .key("tie")
+                    .key(&tie.key)
+                    .error(format!("{{value}} uses `{name}`, which is not varied"), help));
             }
         }
     }
@@ -118,7 +138,8 @@ impl Known<'_> {
     }
 
     fn constraint(&self, at: &At, text: &str) -> Result<Constraint, CaseError> {
-        let help = "write two formulas with <= or >= between them, as \"q_z <= 0.4\"; for an equality, \"abs(A4) <= 1\"";
+        let help =
+            "write two formulas with <= or >= between them, as \"q_z <= 0.4\"; for an equality, \"abs(A4) <= 1\"";
         let wrong = || at.error("{value} is no constraint", help);
         let at_sign = text.find(['<', '>', '=']).ok_or_else(wrong)?;
         let (left, rest) = text.split_at(at_sign);
@@ -162,19 +183,31 @@ fn ties(at: &At, keys: &StudyKeys) -> Result<Vec<Tie>, CaseError> {
 fn varied(at: &At, key: &str, keys: &VaryKeys, ties: &[Tie]) -> Result<Varied, CaseError> {
     let (from, unit) = end(&at.key("from"), &keys.from)?;
     let mut range = [from, 0.0];
-    let mut start = None;
-    for (name, written) in [("to", Some(&keys.to)), ("start", keys.start.as_ref())] {
+    let (mut start, mut step) = (None, None);
+    for (name, written) in [("to", Some(&keys.to)), ("start", keys.start.as_ref()), ("step", keys.step.as_ref())] {
         let Some(written) = written else { continue };
         let (value, other) = end(&at.key(name), written)?;
         if other != unit {
             let problem = format!("{{value}} has another unit than from = {}", at.key("from").shown());
             return Err(at.key(name).error(problem, "write all of them in the same unit"));
         }
-        if name == "to" { range[1] = value } else { start = Some(value) }
+        match name {
+            "to" => range[1] = value,
+            "start" => start = Some(value),
+            _ => step = Some(value),
+        }
     }
     if range[0] >= range[1] {
         let problem = format!("{{value}} is not above from = {}", at.key("from").shown());
-        return Err(at.key("to").error(problem, "leave room between the bounds; a key that does not vary is set in the case"));
+        return Err(at
+            .key("to")
+            .error(problem, "leave room between the bounds; a key that does not vary is set in the case"));
+    }
+    if let Some(step) = step
+        && !(step > 0.0 && step <= range[1] - range[0])
+    {
+        let problem = "{value} is not above zero and within the bounds";
+        return Err(at.key("step").error(problem, "write a step that fits between the bounds at least once"));
     }
     let log = matches!(keys.scale, Some(Scale::Log));
     if log && range[0] * range[1] <= 0.0 {
@@ -190,7 +223,7 @@ fn varied(at: &At, key: &str, keys: &VaryKeys, ties: &[Tie]) -> Result<Varied, C
         let help = "name a key, as \"electrode.ring.radius\", or use the name in [study.tie], as \"electrode.left.opening\" = \"NAME\"";
         return Err(at.key_error("this is no key of the case, and no tie uses it", help.replace("NAME", key)));
     }
-    let mut varied = Varied { key: key.to_owned(), is_key, range, start: 0.0, unit, log };
+    let mut varied = Varied { key: key.to_owned(), is_key, range, start: 0.0, step, unit, log };
     varied.start = start.unwrap_or_else(|| varied.at(0.5));
     if !(range[0]..=range[1]).contains(&varied.start) {
         let problem = format!("{{value}} is not between {} and {}", at.key("from").shown(), at.key("to").shown());

@@ -15,14 +15,30 @@ pub const BEST: &str = "best.toml";
 
 /// Keys of `[study]` that make it an optimisation.
 const OF_OPTIMISATION: [&str; 11] = [
-    "kind", "objective", "goal", "constraints", "vary", "tie", "evaluations", "tolerance", "optimiser", "starts", "seed",
+    "kind",
+    "objective",
+    "goal",
+    "constraints",
+    "vary",
+    "tie",
+    "evaluations",
+    "tolerance",
+    "optimiser",
+    "starts",
+    "seed",
 ];
 
 /// The text of the case at some values of what is varied, with a comment before it. It is the same case, but for the study.
 ///
 /// # Errors
 /// A key that cannot be written into the user's text.
-pub fn best(case: &Case, source: &CaseSource, optimise: &Optimise, values: &[String], comment: &str) -> Result<String, String> {
+pub fn best(
+    case: &Case,
+    source: &CaseSource,
+    optimise: &Optimise,
+    values: &[String],
+    comment: &str,
+) -> Result<String, String> {
     let mut document: DocumentMut = source.text.parse().map_err(|error| format!("{error}"))?;
     if let Some(study) = document.get_mut("study").and_then(Item::as_table_like_mut) {
         for key in OF_OPTIMISATION {
@@ -32,7 +48,11 @@ pub fn best(case: &Case, source: &CaseSource, optimise: &Optimise, values: &[Str
             document.remove("study");
         }
     }
-    let set = source.sets.iter().filter_map(|set| set.split_once('=')).map(|(key, value)| (key.trim().to_owned(), value.to_owned()));
+    let set = source
+        .sets
+        .iter()
+        .filter_map(|set| set.split_once('='))
+        .map(|(key, value)| (key.trim().to_owned(), value.to_owned()));
     let varied = edits(optimise, values).map_err(|(key, problem)| format!("{key}: {problem}"))?;
     for (key, value) in set.chain(varied) {
         if key == "study" || key.starts_with("study.") {

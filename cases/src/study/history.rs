@@ -29,7 +29,8 @@ fn kind(row: &Row) -> Kind {
 /// Evaluations of one kind as marks.
 fn marks(rows: &[Row], at: impl Fn(&Row) -> f64) -> Vec<Mark> {
     let of = |which: Kind, label: &str, shape: Shape| {
-        let points = rows.iter().filter(|row| kind(row) == which).map(|row| [(row.point + 1) as f64, at(row)]).collect();
+        let points =
+            rows.iter().filter(|row| kind(row) == which).map(|row| [(row.point + 1) as f64, at(row)]).collect();
         Mark { label: label.to_owned(), points, shape }
     };
     let all = [
@@ -60,14 +61,24 @@ pub fn history(title: &str, optimise: &Optimise, outcome: &Outcome) -> Figure {
     let marks = marks(rows, |row| row.value(OBJECTIVE).unwrap_or(floor));
     let curve = Curve { label: "best so far".to_owned(), points: so_far, colour: 1, faint: false };
     let goal = if optimise.goal == Goal::Maximise { "to be large" } else { "to be small" };
+    // A number by itself has its unit.
+    let unit = rows.iter().flat_map(Row::numbers).find(|number| number.name == optimise.objective.text);
+    let unit = unit.map(|number| number.unit.as_str()).filter(|unit| !unit.is_empty());
+    let unit = unit.map(|unit| format!(" ({unit})")).unwrap_or_default();
     let panel = Panel {
         x_label: "evaluation".to_owned(),
-        y_label: format!("{}, {goal}", short(&optimise.objective.text)),
+        y_label: format!("{}{unit}, {goal}", short(&optimise.objective.text)),
         curves: vec![curve],
         marks,
         ..Panel::default()
     };
-    Figure { title: title.to_owned(), subtitle: subtitle(outcome), columns: 1, panels: vec![panel], ..Figure::default() }
+    Figure {
+        title: title.to_owned(),
+        subtitle: subtitle(outcome),
+        columns: 1,
+        panels: vec![panel],
+        ..Figure::default()
+    }
 }
 
 /// What was varied over the evaluations, with the best.

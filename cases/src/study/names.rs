@@ -81,10 +81,10 @@ pub fn origin(names: &[(String, From)], name: &str) -> Option<From> {
     names.iter().find(|(known, _)| of(known)).map(|(_, from)| *from)
 }
 
-/// What names take together.
-pub fn asked<'n>(case: &Case, wanted: impl Iterator<Item = &'n str>, sweep: bool) -> Asked {
+/// What names take together; `flights`: grains fly in any case.
+pub fn asked<'n>(case: &Case, wanted: impl Iterator<Item = &'n str>, flights: bool) -> Asked {
     let known = names(case);
-    let mut asked = if sweep { Asked::OF_SWEEPS } else { Asked { flights: false, ..Asked::OF_SWEEPS } };
+    let mut asked = Asked { flights, ..Asked::OF_SWEEPS };
     for name in wanted {
         match origin(&known, name) {
             Some(From::Flights) => asked.flights = true,

@@ -123,7 +123,8 @@ pub fn optimise(
         tolerance: optimise.tolerance,
         first_step: FIRST_STEP,
         constraints: optimise.constraints.len(),
-        evaluations: optimise.evaluations,
+        // Steps that can be made let a search come to the same row again, which costs nothing.
+        evaluations: 10 * optimise.evaluations,
     };
     let mut converged = false;
     let count = starts.len();
@@ -147,6 +148,21 @@ pub fn optimise(
         let start = climb.places[best].clone();
         converged = search(&mut climb, &start, &settings);
         climb.failure.take().map_or(Ok(()), Err)?;
+    }
+    // Linear models do not see steps: of what comes in steps no neighbour of the best may be better.
+    if optimise.varied.iter().any(|varied| varied.step.is_some()) {
+        while let Some(best) = climb.best()
+            && !climb.is_over()
+        {
+            let around = climb.neighbours(best);
+            climb.judge(&around);
+            climb.failure.take().map_or(Ok(()), Err)?;
+            if climb.best() == Some(best) {
+                converged = !climb.is_over();
+                break;
+            }
+            converged = false;
+        }
     }
     Ok(climb.outcome(converged))
 }
@@ -172,10 +188,9 @@ impl Landscape for Climb<'_, '_> {
     /// Central differences of a function known to ε are off by h² from its bends and by ε/h from the errors: h = ε^(1/3).
     fn difference(&self) -> f64 {
         let least = (10.0 * self.optimise.tolerance).min(0.01);
-        let relative = self.best().and_then(|best| {
-            let (value, error) = (self.objective(&self.rows[best]).ok()?, self.error(&self.rows[best])?);
-            Some(error / value.abs().max(f64::MIN_POSITIVE))
-        });
+        // Against the objective where the search began: at the optimum it may be zero.
+        let size = self.sizes.as_ref().map(|(size, _)| *size);
+        let relative = self.best().zip(size).and_then(|(best, size)| Some(self.error(&self.rows[best])? / size));
         relative.unwrap_or(1e-6).cbrt().clamp(least, 0.03)
     }
 }
@@ -184,6 +199,30 @@ impl Climb<'_, '_> {
     /// The values of what is varied at a place, as they are written.
     fn values(&self, place: &[f64]) -> Vec<String> {
         self.optimise.varied.iter().zip(place).map(|(varied, x)| varied.written(varied.at(*x))).collect()
+    }
+
+    /// The places one step away from a row along each key that comes in steps, and along each pair of them.
+    fn neighbours(&self, row: usize) -> Vec<Vec<f64>> {
+        let place = &self.places[row];
+        let mut around = vec![place.clone()];
+        for (k, varied) in self.optimise.varied.iter().enumerate() {
+            let Some(step) = varied.step else { continue };
+            let here = varied.at(place[k]);
+            let moved = |from: &Vec<f64>, by: f64| {
+                let mut to = from.clone();
+                to[k] = varied.place(here + by);
+                to
+            };
+            let single = |from: &Vec<f64>| from.iter().zip(place).filter(|(a, b)| a != b).count() < 2;
+            let more: Vec<Vec<f64>> = around
+                .iter()
+                .filter(|from| single(from))
+                .flat_map(|from| [moved(from, -step), moved(from, step)])
+                .collect();
+            around.extend(more);
+        }
+        around.retain(|to| to != place && to.iter().all(|x| (-1e-9..=1.0 + 1e-9).contains(x)));
+        around
     }
 
     /// Works out the rows that are not there yet, as far as the budget goes.
@@ -269,7 +308,7 @@ impl Climb<'_, '_> {
             && let End::Done(numbers) = &mut row.end
             && let Some(first) = numbers.first_mut()
         {
-            first.error = Some(error).filter(|error| error.is_finite());
+            first.error = Some(error).filter(|error| error.is_finite() && *error > 0.0);
         }
         self.rows.push(row);
         self.judged.push(judged);

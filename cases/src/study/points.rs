@@ -1,7 +1,7 @@
 //! The points of a sweep.
 
-use crate::cache::{Digest, digest, solution_key};
 use super::files::number_and_unit;
+use crate::cache::{Digest, digest, solution_key};
 use crate::case::{Case, Optimise};
 use crate::quantity::in_si;
 use crate::{CaseError, CaseSource};
@@ -58,8 +58,10 @@ pub fn case_at(case: &Case, source: &CaseSource, values: &[String]) -> Result<(C
 /// A tie without a value: its key, and why.
 pub fn edits(optimise: &Optimise, values: &[String]) -> Result<Vec<(String, String)>, (String, String)> {
     let pairs = || optimise.varied.iter().zip(values);
-    let mut edits: Vec<(String, String)> =
-        pairs().filter(|(varied, _)| varied.is_key).map(|(varied, value)| (varied.key.clone(), value.clone())).collect();
+    let mut edits: Vec<(String, String)> = pairs()
+        .filter(|(varied, _)| varied.is_key)
+        .map(|(varied, value)| (varied.key.clone(), value.clone()))
+        .collect();
     let of = |name: &str| pairs().find(|(varied, _)| varied.key == name).and_then(|(_, value)| value_in_si(value));
     for tie in &optimise.ties {
         let value = tie.value.value(of).map_err(|problem| (tie.key.clone(), problem))?;

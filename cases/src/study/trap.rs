@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 use field::Samples;
 use field::analysis::critical::polish;
 use field::analysis::{
-    Effective, Expansion, Jet, Kind, Search, Space, Tones, clearance, critical_points_on, values_on, well,
+    Effective, Expansion, Jet, Kind, Opening, Search, Space, Tones, clearance, critical_points_on, values_on, well,
 };
 use field::constants::COULOMB;
 use meshes::Vec3;
@@ -28,6 +28,9 @@ const E: f64 = 1.602_176_634e-19;
 
 /// Places along a radius at which the mean force is looked at before the circle is narrowed down.
 const PLACES: usize = 96;
+
+/// Error of a depth, as part of it, from which on it is one of the lattice.
+const COARSE: f64 = 0.05;
 
 /// What the numbers of a trap share.
 struct Trap<'a> {
@@ -103,10 +106,7 @@ impl Trap<'_> {
         let region = tracer::Region { min: self.bounds.min, max: self.bounds.max };
         let system = alone(self.case, self.driven.field.clone(), region);
         let forces = &self.case.forces;
-        (
-            system.drag_rate(group.mass, group.radius).unwrap_or(0.0),
-            forces.gravity + forces.constant / group.mass,
-        )
+        (system.drag_rate(group.mass, group.radius).unwrap_or(0.0), forces.gravity + forces.constant / group.mass)
     }
 
     /// a, q and β along the axes of coordinates at the centre, and the frequencies of the motion about the periodic orbit there.
@@ -184,7 +184,16 @@ impl Trap<'_> {
             let walls = |a: &Vec3, b: &Vec3| first_wall(&self.driven.exact, ground, electrodes, a, b);
             let floor = (&minimum.position, minimum.value);
             let well = well(&self.space, &potential, (&lattice, &values), floor, &others, &walls)?;
-            Some(on_surface(&self.space, self.solution, electrodes, &potential, minimum.value, well))
+            let mut well = on_surface(&self.space, self.solution, electrodes, &potential, minimum.value, well);
+            // Where the lattice alone says how deep it is, the pass is one of those that the search found: the highest that is not above
+            // what the way over the nodes has to climb. An optimiser needs a depth without the jumps of nodes.
+            let height = well.depth * (1.0 + 1e-3);
+            let passes = found.iter().filter(|c| c.kind == Kind::Pass).map(|c| c.value - minimum.value);
+            let pass = passes.filter(|p| (0.5 * well.depth..height).contains(p)).fold(0.0, f64::max);
+            if well.opening == Opening::Pass && well.error > COARSE * well.depth && pass > 0.0 {
+                (well.depth, well.error) = (pass, 2.0 * self.space.error * pass);
+            }
+            Some(well)
         });
         let (joules, error) =
             depth.map_or((f64::NAN, f64::NAN), |well| (well.depth * group.mass, well.error * group.mass));

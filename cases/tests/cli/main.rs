@@ -12,6 +12,7 @@ mod ground;
 mod harness;
 mod json;
 mod odd;
+mod optimise;
 mod resume;
 mod same;
 mod stopped;

@@ -365,8 +365,7 @@ pub(crate) fn on_surface(
     let surface = 3.0 * values[0] - 3.0 * values[1] + values[2];
     let depth = surface - floor;
     // What the last step changed, a tenth of it.
-    well.error =
-        2.0 * space.error * depth + 0.1 * (depth - well.depth).abs() + 0.02 * (surface - values[0]).abs();
+    well.error = 2.0 * space.error * depth + 0.1 * (depth - well.depth).abs() + 0.02 * (surface - values[0]).abs();
     well.depth = depth;
     well
 }
