@@ -87,7 +87,7 @@ pub(super) fn optimise(at: &At, keys: &StudyKeys, case: &Case) -> Result<(Option
     }
     let starts = keys.starts.map_or(1, |n| n.count());
     // A simplex has to be begun and moved.
-    let least = starts * (varied.len() + 2);
+    let least = starts.saturating_mul(varied.len() + 2);
     if evaluations < least {
         let problem = format!("{evaluations} evaluations are too few for {starts} starts and {} keys", varied.len());
         return Err(at.key("evaluations").error(problem, format!("allow at least {least}")));

@@ -9,6 +9,9 @@ use exmex::{Express, FlatEx};
 use crate::key_path::is_name_character;
 use crate::quantity::in_si;
 
+/// Longer formulas are no work of a person, and parentheses too deep for the parser.
+const LONGEST: usize = 1000;
+
 /// A formula.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expression {
@@ -25,6 +28,9 @@ impl Expression {
     pub fn parse(text: &str) -> Result<Self, String> {
         if text.trim().is_empty() {
             return Err("there is no formula".to_owned());
+        }
+        if text.len() > LONGEST {
+            return Err(format!("it is longer than {LONGEST} characters"));
         }
         let parsed = exmex::parse::<f64>(&plain(text)?).map_err(|error| error.msg().to_owned())?;
         // The crate lets some things pass that have no value, as a list.
@@ -100,6 +106,15 @@ fn plain(text: &str) -> Result<String, String> {
                 "pi" => plain.push_str(&format!("{}", std::f64::consts::PI)),
                 _ => plain.push_str(&format!("{{{name}}}")),
             }
+        } else if first == '-' {
+            // The crate binds a sign more closely than a power; everybody else reads -x^2 as -(x^2).
+            plain.push_str(match plain.trim_end().chars().last() {
+                None | Some('(' | ',') => "0-",
+                Some('*' | '+' | '-') => "(0-1)*",
+                Some('/') => "(0-1)/",
+                _ => "-",
+            });
+            rest = &rest[1..];
         } else {
             plain.push(first);
             rest = &rest[first.len_utf8()..];
@@ -130,6 +145,8 @@ mod tests {
             ("-abs(A4_rf/A2)", -0.5),
             ("2*A4_rf^2 - A2", 12.0),
             ("-A2^2", -16.0),
+            ("2 * -A4_rf^2 - -A2^2", 8.0),
+            ("1 / -A4_rf^2 + max(-1, -A4_rf^2) + 2^-1", -0.75),
             ("1e-3 + 2.5E2", 250.001),
             ("electrode.ring.radius - 5 mm", 0.015),
             ("electrode.ring.radius-0.005", 0.015),

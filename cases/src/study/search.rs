@@ -119,8 +119,11 @@ fn cobyla(landscape: &mut dyn Landscape, start: &[f64], settings: &Settings) -> 
     let ended = cobyla::minimize(value, start, &bounds, &constraints, (), settings.evaluations, first, Some(stop));
     let over = memory.borrow().landscape.is_over();
     // Where rounding stops it, nothing more is to be had.
-    !over && matches!(ended, Ok((status, ..)) if !matches!(status, cobyla::SuccessStatus::MaxEvalReached))
-        || !over && matches!(ended, Err((cobyla::FailStatus::RoundoffLimited, ..)))
+    !over
+        && match ended {
+            Ok((status, ..)) => !matches!(status, cobyla::SuccessStatus::MaxEvalReached),
+            Err((status, ..)) => matches!(status, cobyla::FailStatus::RoundoffLimited),
+        }
 }
 
 fn slsqp(landscape: &mut dyn Landscape, start: &[f64], settings: &Settings) -> bool {
@@ -151,8 +154,11 @@ fn slsqp(landscape: &mut dyn Landscape, start: &[f64], settings: &Settings) -> b
     let bounds = vec![(0.0, 1.0); start.len()];
     let ended = slsqp::minimize(value, start, &bounds, &constraints, (), settings.evaluations, Some(stop));
     let over = memory.borrow().landscape.is_over();
-    !over && matches!(ended, Ok((status, ..)) if !matches!(status, slsqp::SuccessStatus::MaxEvalReached))
-        || !over && matches!(ended, Err((slsqp::FailStatus::RoundoffLimited, ..)))
+    !over
+        && match ended {
+            Ok((status, ..)) => !matches!(status, slsqp::SuccessStatus::MaxEvalReached),
+            Err((status, ..)) => matches!(status, slsqp::FailStatus::RoundoffLimited),
+        }
 }
 
 #[cfg(test)]

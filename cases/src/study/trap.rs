@@ -208,7 +208,7 @@ impl Trap<'_> {
     ///   -dU/dρ + k Q²/(4 m ρ²) Σ_{n<N} 1/sin(πn/N) = 0
     ///
     /// with U the effective potential per mass: outward inside of it, inward outside (physics of the annulus: Dehmelt 1967 for U; a ring
-    /// of charges: Thomson 1904). Checked by `experiment_annulus_*` (the same sum against flown grains) and `cli_study_annulus_voltages`.
+    /// of charges: Thomson 1904). Checked by `experiment_annulus_*` (the same sum against flown grains) and `cli_optimise_annulus_voltages`.
     fn annulus(&self, group: &GrainGroup) -> Number {
         let name = "annulus_radius";
         let none = || Number::new(name, "m", f64::NAN, None);
