@@ -48,6 +48,8 @@ pub fn history(title: &str, optimise: &Optimise, outcome: &Outcome) -> Figure {
     let mut best = f64::NAN;
     let mut so_far = Vec::new();
     for row in rows {
+        // Stairs: what was best stays so until it is surpassed.
+        so_far.push([(row.point + 1) as f64, best]);
         if let (Kind::Holds, Some(value)) = (kind(row), row.value(OBJECTIVE))
             && (best.is_nan() || better(value, best))
         {
