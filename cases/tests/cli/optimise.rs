@@ -64,7 +64,7 @@ fn cli_optimise_finds_known_optima() {
         let best = &json["best"];
         assert_eq!(json["converged"], true, "{optimiser}");
         assert_eq!(json["active"].as_array().unwrap().len(), 0, "{}", json["active"]);
-        // Linear models come to rest where the parabola is flat: 5e-4 of a range from its bottom it is a millionth higher.
+        // Linear models come to rest where the parabola is flat: 5e-4 of a range from its bottom it is 3e-5 higher at most.
         close(number(best, "source.q.rf.amplitude"), volts(0.5), 5e-4 * 800.0);
         close(number(best, "source.q.dc"), 1.2, 5e-4 * 10.0);
         // 2. The best case is a case like any other, with the numbers that it was chosen for.
