@@ -68,7 +68,8 @@ pub fn best(
     if !same(case, source, values, &document.to_string())? {
         return Err("the text that was written is another case".to_owned());
     }
-    let folder = std::path::absolute(source.folder()).map_err(|error| format!("{error}"))?;
+    // A file named without a folder is in the current one.
+    let folder = std::path::absolute(PathBuf::from(".").join(source.folder())).map_err(|error| format!("{error}"))?;
     Absolute(folder).visit_document_mut(&mut document);
     Ok(format!("{comment}\n{}", document.to_string().trim_start()))
 }

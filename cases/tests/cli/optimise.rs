@@ -107,7 +107,7 @@ fn cli_optimise_finds_known_optima() {
     assert!(json["points"].as_u64().unwrap() <= 17, "no step is worked out twice");
 }
 
-/// Rings that cut each other where they come too near: `gap` is their distance.
+/// Two rings, `half` of their distance varied.
 const RINGS: &str = r#"
 [[electrode]]
 name        = "left"
@@ -139,7 +139,7 @@ half = { from = "0.5 mm", to = "8 mm", start = "2 mm" }
 "#;
 
 #[test]
-fn cli_optimise_goes_on_after_a_kill_and_round_what_fails() {
+fn cli_optimise_goes_on_after_a_kill() {
     let scratch = Scratch::new();
     let case = scratch.file("rings.toml", RINGS);
     let (whole, cut) = (scratch.at("whole"), scratch.at("cut"));
@@ -165,15 +165,6 @@ fn cli_optimise_goes_on_after_a_kill_and_round_what_fails() {
         let file = |folder: &str| fs::read(Path::new(folder).join(name)).unwrap();
         assert_eq!(file(&whole), file(&cut), "{name}");
     }
-    // From where the wires nearly touch, towards where they do: those places fail, and have their reasons.
-    let text = RINGS.replace("A4^2 / 1e10", "half").replace("start = \"2 mm\"", "start = \"1.5 mm\"");
-    let json = study(&scratch.file("touch.toml", &text), &scratch.at("touch"), &[]).done().json();
-    assert!(json["failed"].as_u64().unwrap() > 0);
-    let rows = json["rows"].as_array().unwrap();
-    assert!(rows.iter().any(|row| row["reason"].as_str().is_some_and(|r| r.contains("touches or cuts"))), "{rows:?}");
-    // The wires touch at half = 1 mm.
-    let best = number(&json["best"], "half");
-    assert!(best > 1.0 && best < 1.3, "{best}");
     // Where the search starts must be a case.
     let text = RINGS.replace(
         "half = { from = \"0.5 mm\", to = \"8 mm\", start = \"2 mm\" }",
