@@ -51,6 +51,10 @@ const BEYOND_A_SCHEMA: &str = "\
     samples_backwards samples_missing samples_nan source_caps_in_two_dimensions source_driven_by_volts \
     source_uniform_in_volts sweep_units_differ sweep_unknown_electrode table_inside_out table_spacing up_along_axis \
     wire_point_twice temperature_below_zero opening_zero quantity_trailing sweep_of_nothing sweep_zip sweep_without_samples sweep_without_steps sweep_endless study_grazing \
+    study_unknown_number study_not_a_formula study_constant_objective study_without_objective study_varies_nothing study_empty_bounds \
+    study_start_outside study_start_in_another_unit study_step_too_wide study_log_through_zero study_name_of_nothing \
+    study_tie_of_nothing study_tied_and_varied study_no_constraint study_constraint_on_nothing study_too_few_evaluations \
+    study_too_many_evaluations study_objective_of_a_sweep study_sweeps_too \
     drag_unit frequency_in_seconds quantity_overflow source_without_strength table_memory temperature_in_coulombs \
     unit_of_another_kind unit_unknown unit_wrong_case vector_with_wrong_unit";
 

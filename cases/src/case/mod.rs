@@ -3,6 +3,7 @@
 mod analysis;
 mod electrode;
 mod foreign;
+mod optimise;
 mod parts;
 mod settings;
 
@@ -12,10 +13,11 @@ use field::Waveform;
 use serde::Serialize;
 
 pub use crate::keys::settings::{Gas, Integrator, Method, Reflection, Solver};
-pub use crate::keys::study::StudyKind;
+pub use crate::keys::study::{Goal, Optimiser, StudyKind};
 pub use crate::keys::sweep::Sampling;
 pub use analysis::{Analysis, Chart, ChartAxis, ChartGrains, ChartVoltages, WantedMultipole, Wish};
 pub use electrode::{Drive, Electrode, ElectrodeShape, ImportedMesh, MeshFormat, Source, SourceKind};
+pub use optimise::{Asked, Constraint, Optimise, Tie, Varied};
 pub use parts::CaseParts;
 pub use settings::{
     Drag, FieldSettings, Forces, GROUND, GrainGroup, Output, Region, Study, Sweep, SweepAxis, TableSettings,

@@ -5,7 +5,7 @@ use meshes::Vec3;
 use serde::Serialize;
 use tracer::{Launch, Place};
 
-use super::{Gas, Integrator, Method, Reflection, Sampling, Solver, StudyKind, foreign};
+use super::{Asked, Gas, Integrator, Method, Optimise, Reflection, Sampling, Solver, StudyKind, foreign};
 
 /// How exactly the field is computed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -229,6 +229,12 @@ pub struct Study {
     /// What a study of grids weighs. Rows do not depend on it.
     #[serde(skip)]
     pub weighing: Weighing,
+    /// Which numbers are worked out.
+    #[serde(skip_serializing_if = "Asked::is_of_sweeps")]
+    pub asked: Asked,
+    /// What is optimised. Rows do not depend on it.
+    #[serde(skip)]
+    pub optimise: Option<Optimise>,
 }
 
 /// What makes a grid the best: the least of `weight` (1 - T) + deviation / `tolerated`, T the transparency.

@@ -6,6 +6,7 @@ mod check;
 mod fields;
 mod interrupt;
 mod mesh;
+mod optimise;
 mod probe;
 mod progress;
 mod report;

@@ -26,10 +26,13 @@ use crate::study::shard::Shard;
 use crate::study::work::{Tally, Work};
 
 /// Rows that `--json` and `study.json` list.
-const LISTED: usize = 10_000;
+pub(super) const LISTED: usize = 10_000;
 
 pub(super) fn study(mut session: Session, arguments: &StudyArguments) -> Result<(), Failure> {
     let start = Instant::now();
+    if session.case.study.optimise.is_some() {
+        return super::optimise::optimise(session, arguments);
+    }
     let (case, source) = (&session.case, &session.source);
     let Some(sweep) = case.sweep.clone() else {
         let help = "add [sweep] with a line such as \"electrode.left.dc\" = [\"1 V\", \"2 V\"]";
@@ -65,6 +68,7 @@ pub(super) fn study(mut session: Session, arguments: &StudyArguments) -> Result<
         strikes: &strikes,
         reporter: &*session.progress,
         solids: Mutex::default(),
+        last: Mutex::default(),
     };
     let (rows, tally) = work.rows(&mut out, all, refused, &before)?;
     finish(&session, out, &sweep, &rows, tally, shard, start)
@@ -155,20 +159,13 @@ fn finish(
         session.progress.warning(&format!("the sweep reports `{unknown}`, which no point has; {help}"));
     }
     let table = Table::new(sweep, rows);
-    out.write(CSV, |w| table.csv(w))?;
-    let columns = table.parquet().map_err(|error| {
-        Failure::run(
-            format!("{PARQUET} cannot be made: {error}"),
-            "the rows are in the journal; report this as a defect",
-        )
-    })?;
-    out.write(PARQUET, |w| w.write_all(&columns))?;
+    write_table(&mut out, &table)?;
     if let Some(figure) = figure(&session.title(), sweep, rows) {
         pictures::write(&mut out, "study", &figure)?;
     }
     let front = match session.case.study.kind {
         StudyKind::GridTransparency => Front::of(rows, &session.case.study.weighing),
-        StudyKind::Sweep => None,
+        StudyKind::Sweep | StudyKind::Optimise => None,
     };
     if let Some(front) = &front {
         pictures::write(&mut out, "front", &front.figure(&session.title(), sweep, rows))?;
@@ -239,6 +236,18 @@ fn struck(session: &Session, rows: &[Row]) -> Struck {
     let (points, _) = points(&session.case, &session.source);
     let ours = points.iter().filter(|point| rows.iter().any(|row| row.point == point.number));
     ours.filter_map(|point| Some((point.number + 1, kept.remove(&name(&point.key))?))).collect()
+}
+
+/// Writes the rows as tables.
+pub(super) fn write_table(out: &mut OutputFolder, table: &Table) -> Result<(), Failure> {
+    out.write(CSV, |w| table.csv(w))?;
+    let columns = table.parquet().map_err(|error| {
+        Failure::run(
+            format!("{PARQUET} cannot be made: {error}"),
+            "the rows are in the journal; report this as a defect",
+        )
+    })?;
+    out.write(PARQUET, |w| w.write_all(&columns))
 }
 
 /// The study in words.

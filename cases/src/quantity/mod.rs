@@ -203,6 +203,11 @@ fn unknown_unit(text: &str, number: &str, unit: &str, kinds: &[Kind]) -> Quantit
     QuantityError::UnknownUnit { text: text.to_owned(), unit: unit.to_owned(), expected: expected(kinds), help }
 }
 
+/// A number with a unit of whatever kind, in SI.
+pub(crate) fn in_si(text: &str) -> Option<f64> {
+    parse(text, &kind::KINDS).ok().map(|(value, _)| value)
+}
+
 /// The unit in a kind's example.
 fn sample_unit(kind: Kind) -> &'static str {
     kind.example().split_once(' ').map_or("", |(_, unit)| unit)

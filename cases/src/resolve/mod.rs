@@ -7,6 +7,7 @@ mod electrodes;
 mod files;
 mod grains;
 mod names;
+mod optimise;
 mod settings;
 mod shapes;
 mod sources;
@@ -65,6 +66,7 @@ fn resolved(source: &CaseSource, with_chart: bool) -> Result<Case, CaseError> {
         sweep: keys.sweep.map(|keys| sweep::sweep(&root.key("sweep"), keys)).transpose()?,
         study: study::study(&root.key("study"), &keys.study)?,
     };
+    (case.study.optimise, case.study.asked) = optimise::optimise(&root.key("study"), &keys.study, &case)?;
     if let Some(keys) = keys.analysis.chart.as_ref().filter(|_| with_chart) {
         case.analysis.chart = Some(chart::chart(&root.key("analysis").key("chart"), keys, &case)?);
     }

@@ -3,7 +3,7 @@
 use meshes::Vec3;
 
 use super::at::At;
-use crate::case::{Study, Weighing};
+use crate::case::{Asked, Study, Weighing};
 use crate::error::CaseError;
 use crate::keys::study::StudyKeys;
 use crate::keys::value::{DirectionKeys, Vector};
@@ -37,6 +37,9 @@ pub(super) fn study(at: &At, keys: &StudyKeys) -> Result<Study, CaseError> {
             tolerated: keys.tolerated.map_or(TOLERATED, |tolerated| tolerated.value),
             smallest_wire: keys.smallest_wire.map_or(0.0, |wire| wire.value),
         },
+        // What these depend on is known when the whole case is.
+        asked: Asked::OF_SWEEPS,
+        optimise: None,
     })
 }
 

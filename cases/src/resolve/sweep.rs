@@ -87,7 +87,7 @@ fn axis(at: &At, key: String, values: SweepKeys, drawn: Option<&[f64]>) -> Resul
 }
 
 /// Whether the key can be set at all.
-fn varies(at: &At, key: &str, values: &[String]) -> Result<(), CaseError> {
+pub(super) fn varies(at: &At, key: &str, values: &[String]) -> Result<(), CaseError> {
     let of = |table: &str| key == table || key.starts_with(&format!("{table}."));
     if of("sweep") || of("study") {
         return Err(at.key_error("a sweep cannot vary itself", "vary a key of the case, as \"electrode.left.dc\""));

@@ -1,7 +1,9 @@
 //! The points of a sweep.
 
+use super::files::number_and_unit;
 use crate::cache::{Digest, digest, solution_key};
-use crate::case::Case;
+use crate::case::{Case, Optimise};
+use crate::quantity::in_si;
 use crate::{CaseError, CaseSource};
 
 /// One point of a sweep.
@@ -36,10 +38,42 @@ const EDITION: u32 = 2;
 /// # Errors
 /// The values make no case.
 pub fn case_at(case: &Case, source: &CaseSource, values: &[String]) -> Result<(Case, CaseSource), CaseError> {
-    let axes = case.sweep.iter().flat_map(|sweep| &sweep.axes);
-    let varied = axes.zip(values).map(|(axis, value)| format!("{}={value}", axis.key));
+    let varied: Vec<(String, String)> = match &case.study.optimise {
+        Some(optimise) => edits(optimise, values).map_err(|(key, problem)| {
+            source.error_at(&format!("study.tie.{key:?}"), problem, "tie it to what has a value within the bounds")
+        })?,
+        None => {
+            let keys = case.sweep.iter().flat_map(|sweep| &sweep.axes).map(|axis| axis.key.clone());
+            keys.zip(values.iter().cloned()).collect()
+        }
+    };
+    let varied = varied.into_iter().map(|(key, value)| format!("{key}={value}"));
     let sets: Vec<String> = source.sets.iter().cloned().chain(varied).collect();
     Case::parse(&source.path, &source.text, &sets)
+}
+
+/// The keys of the case that a point of an optimisation sets, with their values as they are written.
+///
+/// # Errors
+/// A tie without a value: its key, and why.
+pub fn edits(optimise: &Optimise, values: &[String]) -> Result<Vec<(String, String)>, (String, String)> {
+    let pairs = || optimise.varied.iter().zip(values);
+    let mut edits: Vec<(String, String)> = pairs()
+        .filter(|(varied, _)| varied.is_key)
+        .map(|(varied, value)| (varied.key.clone(), value.clone()))
+        .collect();
+    let of = |name: &str| pairs().find(|(varied, _)| varied.key == name).and_then(|(_, value)| value_in_si(value));
+    for tie in &optimise.ties {
+        let value = tie.value.value(of).map_err(|problem| (tie.key.clone(), problem))?;
+        edits.push((tie.key.clone(), format!("{value:?}")));
+    }
+    Ok(edits)
+}
+
+/// A value of a key as it is written, in SI.
+pub fn value_in_si(text: &str) -> Option<f64> {
+    let (number, unit) = number_and_unit(text)?;
+    if unit.is_empty() { Some(number) } else { in_si(&format!("{number} {unit}")) }
 }
 
 /// All points of a case's sweep, and those that cannot be.
@@ -57,9 +91,12 @@ pub fn points(case: &Case, source: &CaseSource) -> (Vec<Point>, Vec<Refused>) {
 }
 
 /// The digest of everything that a row depends on.
-fn key(case: &Case) -> Digest {
+pub fn key(case: &Case) -> Digest {
     let parts = case.parts();
-    let study = serde_json::to_string(&case.study).unwrap_or_default();
+    let mut study = serde_json::to_string(&case.study).unwrap_or_default();
+    if case.study.asked.trap() {
+        study += &format!("{:?} {}", case.analysis.region, case.analysis.nodes);
+    }
     let edition = format!("row {EDITION} of {}", env!("CARGO_PKG_VERSION"));
     digest(&[
         edition.as_bytes(),

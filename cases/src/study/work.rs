@@ -12,9 +12,10 @@ use super::journal::{Journal, usable};
 use super::numbers;
 use super::points::{Point, Refused, case_at};
 use super::row::{End, Number, Row};
+use super::trap;
 use crate::CaseSource;
 use crate::cache::{Cache, Digest, solution_key, table_key};
-use crate::case::{Case, StudyKind};
+use crate::case::Case;
 use crate::output::OutputFolder;
 use crate::pipeline::flights::{Flights, fly, induction, obstacles};
 use crate::pipeline::ready::{Ready, check_starts_again, flight_region, ready};
@@ -75,6 +76,8 @@ pub struct Work<'a> {
     pub reporter: &'a dyn Reporter,
     /// What was solved with plates in place of grids.
     pub solids: Mutex<HashMap<Digest, Arc<Solution>>>,
+    /// The last solution: points that come one after the other may share it.
+    pub last: Mutex<Option<(Digest, Arc<Solution>)>>,
 }
 
 /// A point whose case stands ready to fly.
@@ -145,7 +148,7 @@ impl Work<'_> {
     ) -> Result<Vec<Row>, Failure> {
         let shared = group.len() > 1;
         let mut rows = Vec::with_capacity(group.len());
-        let mut solved: Option<Result<Solution, Failure>> = None;
+        let mut solved: Option<Result<Arc<Solution>, Failure>> = None;
         let mut last: Option<(Digest, Tabulated)> = None;
         let mut rest = group.into_iter().peekable();
         while rest.peek().is_some() {
@@ -262,19 +265,35 @@ impl Work<'_> {
         }
     }
 
-    fn solution(&self, first: &Standing, tally: &mut Tally) -> Result<Solution, Failure> {
-        if let Ok(Some(solution)) = self.cache.solution(&first.case) {
-            tally.solutions_kept += 1;
-            return Ok(solution);
+    fn solution(&self, first: &Standing, tally: &mut Tally) -> Result<Arc<Solution>, Failure> {
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        let key = first.point.solution;
+        if let Some((known, solution)) = &*last
+            && *known == key
+        {
+            return Ok(Arc::clone(solution));
         }
-        tally.solved += 1;
-        // Its warnings come with the solution, kept or not.
-        solve(&first.case, &first.source, &first.ready, &Quiet::default())
+        // Before the next is there: two may not fit.
+        *last = None;
+        let solution = match self.cache.solution(&first.case) {
+            Ok(Some(solution)) => {
+                tally.solutions_kept += 1;
+                solution
+            }
+            _ => {
+                tally.solved += 1;
+                // Its warnings come with the solution, kept or not.
+                solve(&first.case, &first.source, &first.ready, &Quiet::default())?
+            }
+        };
+        let solution = Arc::new(solution);
+        *last = Some((key, Arc::clone(&solution)));
+        Ok(solution)
     }
 
     /// The same trap with plates in place of its grids, where the study is one of grids.
     fn solid(&self, first: &Standing, tally: &mut Tally) -> Result<Option<Arc<Solution>>, Failure> {
-        if first.case.study.kind != StudyKind::GridTransparency {
+        if !first.case.study.asked.grids {
             return Ok(None);
         }
         let case = grid::with_plates(&first.case, &first.source)?;
@@ -317,7 +336,7 @@ fn planned(standing: Standing, solution: &Solution) -> Result<Standing, Fallen> 
     let plan = || {
         let Standing { case, source, ready, .. } = &standing;
         check_starts_again(case, source, ready, &solution.basis)?;
-        if ready.ensemble.is_empty() {
+        if ready.ensemble.is_empty() || !case.study.asked.flights {
             return Ok(None);
         }
         Ok(Some(Plan::new(case, &solution.basis)))
@@ -360,6 +379,7 @@ fn worked(
     if let Some(solid) = solid {
         numbers.extend(grid::of_grid(case, &standing.source, solution, solid, tabulated, &**quiet)?);
     }
+    numbers.extend(trap::of_trap(case, &standing.source, solution)?);
     if let Some(tabulated) = tabulated {
         tabulated.warn_if_missed(case, &**quiet);
         numbers.extend(numbers::of_table(tabulated));

@@ -12,6 +12,7 @@ mod ground;
 mod harness;
 mod json;
 mod odd;
+mod optimise;
 mod report;
 mod resume;
 mod same;

@@ -3,7 +3,7 @@
 pub mod brief;
 pub mod chart;
 pub mod report;
-mod species;
+pub(crate) mod species;
 pub mod trap;
 mod wish;
 
@@ -160,7 +160,7 @@ pub fn analyse(
 }
 
 /// The patterns in space of what oscillates, each with its name; those that are alike are one.
-fn patterns(tones: &Tones) -> Vec<(String, Vec<f64>)> {
+pub(crate) fn patterns(tones: &Tones) -> Vec<(String, Vec<f64>)> {
     let mut found: Vec<(String, Vec<f64>)> = Vec::new();
     for tone in &tones.tones {
         for (phase, pattern) in [("", &tone.cosine), (" sine", &tone.sine)] {
@@ -267,7 +267,7 @@ fn multipoles(ground: &Ground, center: Vec3, frame: [Vec3; 3]) -> Result<TrapMul
 }
 
 /// The electrode that a segment meets first, the grounded plane as one more.
-fn first_wall(
+pub(crate) fn first_wall(
     exact: &PanelSum,
     ground: Option<&Plane>,
     electrodes: usize,

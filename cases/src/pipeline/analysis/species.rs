@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use field::analysis::{Effective, Expansion, Opening, Tones, Well, voltages, well};
+use field::analysis::{Effective, Expansion, Opening, Space, Tones, Well, voltages, well};
 use field::{DrivenField, Samples};
 use meshes::Vec3;
 use nalgebra::Matrix3;
@@ -16,6 +16,7 @@ use super::report::{
 use super::{CriticalPoint, Failure, Ground, Jet, Kind, Reporter, critical_points_on, first_wall, polish, values_on};
 use crate::case::{Case, Drive, GROUND, GrainGroup};
 use crate::pipeline::flights;
+use crate::pipeline::solution::Solution;
 
 /// Elementary charge, C.
 const E: f64 = 1.602_176_634e-19;
@@ -121,7 +122,10 @@ pub(super) fn species(
         let walls = |a: &Vec3, b: &Vec3| first_wall(exact, case.field.ground.as_ref(), case.electrodes.len(), a, b);
         let floor = (&minimum.position, minimum.value);
         let found = well(space, &potential, (&ground.lattice, &values), floor, &others, &walls);
-        report.depth_ev = found.map(|well| depth(ground, group, &on_surface(ground, &potential, minimum.value, well)));
+        report.depth_ev = found.map(|well| {
+            let (solution, electrodes) = (ground.solution, case.electrodes.len());
+            depth(ground, group, &on_surface(space, solution, electrodes, &potential, minimum.value, well))
+        });
         report.offset = Some(offset(ground, group, &potential, minimum, acceleration));
     }
     Ok((report, potential))
@@ -148,7 +152,7 @@ impl Species {
 }
 
 /// What a grain alone and without noise flies through.
-pub(super) fn alone(case: &Case, field: DrivenField, region: tracer::Region) -> System {
+pub(crate) fn alone(case: &Case, field: DrivenField, region: tracer::Region) -> System {
     let whole = flights::system(case, field.clone(), None, None, region);
     let mut alone = System::new().with_field(field);
     if case.forces.gravity != Vec3::zeros() {
@@ -174,7 +178,7 @@ pub(super) fn principal(hessian: &Matrix3<f64>) -> ([f64; 3], [Vec3; 3]) {
 }
 
 /// Matrices of a, and of q with the cosine and the sine of a frequency (Hz).
-pub(super) fn bends(tones: &Tones, jets: &[Jet], specific: f64, frequency: f64) -> [Matrix3<f64>; 3] {
+pub(crate) fn bends(tones: &Tones, jets: &[Jet], specific: f64, frequency: f64) -> [Matrix3<f64>; 3] {
     let omega = TAU * frequency;
     let scale = 4.0 * specific / (omega * omega);
     let bend = |weights: &[f64]| Jet::sum(jets, weights).hessian;
@@ -185,7 +189,7 @@ pub(super) fn bends(tones: &Tones, jets: &[Jet], specific: f64, frequency: f64) 
 }
 
 /// a and q on three axes.
-pub(super) fn parameters([statics, cosine, sine]: &[Matrix3<f64>; 3], axes: &[Vec3; 3]) -> ([f64; 3], [f64; 3]) {
+pub(crate) fn parameters([statics, cosine, sine]: &[Matrix3<f64>; 3], axes: &[Vec3; 3]) -> ([f64; 3], [f64; 3]) {
     let along = |m: &Matrix3<f64>, axis: &Vec3| axis.dot(&(m * axis));
     let q = |axis: &Vec3| {
         let (c, s) = (along(cosine, axis), along(sine, axis));
@@ -239,7 +243,7 @@ pub(super) fn mathieu(
 }
 
 /// The modes of the motion in the order of the principal axes.
-pub(super) fn in_order(modes: &[Mode], axes: &[Vec3; 3]) -> Vec<Mode> {
+pub(crate) fn in_order(modes: &[Mode], axes: &[Vec3; 3]) -> Vec<Mode> {
     let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
     let overlap = |order: &[usize; 3]| -> f64 {
         order.iter().zip(axes).map(|(k, axis)| modes.get(*k).map_or(0.0, |mode| mode.axis.dot(axis).powi(2))).sum()
@@ -335,29 +339,35 @@ fn nearest_line(lines: &[Vec<Measured>; 3], frequency: f64) -> Option<Measured> 
 
 /// The depth of a well that opens at an electrode, on the true surface in place of the panels that show it: from a point beside the
 /// panel it is as far as the electrode's own unit potential is from one, over its slope.
-fn on_surface(ground: &Ground, potential: &Effective, floor: f64, mut well: Well) -> Well {
+pub(crate) fn on_surface(
+    space: &Space,
+    solution: &Solution,
+    electrodes: usize,
+    potential: &Effective,
+    floor: f64,
+    mut well: Well,
+) -> Well {
     let Opening::Wall(electrode) = well.opening else { return well };
-    if electrode >= ground.case.electrodes.len() {
+    if electrode >= electrodes {
         return well;
     }
     let eye = well.beside;
-    let units = ground.solution.basis.panel_sum();
+    let units = solution.basis.panel_sum();
     let mut samples = Samples::default();
     field::BasisField::sample(&units, &[eye], &mut samples);
     let (own, slope) = (samples.potential[electrode], samples.gradient[electrode]);
     let distance = (1.0 - own) / slope.norm();
-    if !distance.is_finite() || distance.abs() > 0.3 * ground.space.size {
+    if !distance.is_finite() || distance.abs() > 0.3 * space.size {
         return well;
     }
     let out = slope / slope.norm();
     let near = [eye, eye - out * distance.abs(), eye - out * (2.0 * distance.abs())];
-    let values = potential.values(ground.space.field, &near, &mut samples);
+    let values = potential.values(space.field, &near, &mut samples);
     // A parabola through three places on the way, carried on to the surface.
     let surface = 3.0 * values[0] - 3.0 * values[1] + values[2];
     let depth = surface - floor;
     // What the last step changed, a tenth of it.
-    well.error =
-        2.0 * ground.space.error * depth + 0.1 * (depth - well.depth).abs() + 0.02 * (surface - values[0]).abs();
+    well.error = 2.0 * space.error * depth + 0.1 * (depth - well.depth).abs() + 0.02 * (surface - values[0]).abs();
     well.depth = depth;
     well
 }

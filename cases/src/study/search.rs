@@ -1,0 +1,227 @@
+//! The search for the least value of a function in the unit cube, with constraints.
+//!
+//! Both methods are those of NLopt, in Rust: COBYLA (Powell 1994, "A direct search optimization method that models the objective and
+//! constraint functions by linear interpolation") and SLSQP (Kraft 1988, DFVLR-FB 88-28). Neither draws random numbers: the same
+//! values give the same search.
+
+use std::cell::RefCell;
+
+use crate::case::Optimiser;
+
+/// A place and what was found there.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Judged {
+    /// To be as small as can be; of the order of one.
+    pub value: f64,
+    /// Each to be zero or more; of the order of one.
+    pub slack: Vec<f64>,
+}
+
+/// What is searched.
+pub trait Landscape {
+    /// What is found at each of some places in the unit cube, in their order.
+    fn judge(&mut self, places: &[Vec<f64>]) -> Vec<Judged>;
+
+    /// Whether nothing more may be asked.
+    fn is_over(&self) -> bool;
+
+    /// Distance (part of the range) of central differences: where the error of the values and that of the differences are alike.
+    fn difference(&self) -> f64;
+}
+
+/// How a search is done.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// What searches.
+    pub optimiser: Optimiser,
+    /// Part of each range to which the place is to be known.
+    pub tolerance: f64,
+    /// The size of the first steps, as part of each range.
+    pub first_step: f64,
+    /// How many constraints there are.
+    pub constraints: usize,
+    /// How many places may be asked for.
+    pub evaluations: usize,
+}
+
+/// Searches from a place; gives whether the place came to be known to the tolerance. What was found is in the landscape's own memory.
+pub fn search(landscape: &mut dyn Landscape, start: &[f64], settings: &Settings) -> bool {
+    match settings.optimiser {
+        Optimiser::Cobyla => cobyla(landscape, start, settings),
+        Optimiser::Slsqp => slsqp(landscape, start, settings),
+    }
+}
+
+/// The last place that was asked for, so that objective and constraints are told of one evaluation.
+struct Memory<'l> {
+    landscape: &'l mut dyn Landscape,
+    last: Option<(Vec<f64>, Judged)>,
+    /// The same with derivatives: of the value, then of each slack.
+    slopes: Option<(Vec<f64>, Vec<Vec<f64>>)>,
+}
+
+impl Memory<'_> {
+    fn judged(&mut self, place: &[f64]) -> Judged {
+        let place: Vec<f64> = place.iter().map(|x| x.clamp(0.0, 1.0)).collect();
+        if let Some((known, judged)) = &self.last
+            && *known == place
+        {
+            return judged.clone();
+        }
+        let judged = self.landscape.judge(std::slice::from_ref(&place)).pop().unwrap_or_default();
+        self.last = Some((place, judged.clone()));
+        judged
+    }
+
+    fn slopes(&mut self, place: &[f64]) -> Vec<Vec<f64>> {
+        let place: Vec<f64> = place.iter().map(|x| x.clamp(0.0, 1.0)).collect();
+        if let Some((known, slopes)) = &self.slopes
+            && *known == place
+        {
+            return slopes.clone();
+        }
+        let h = self.landscape.difference();
+        let beside = |k: usize, by: f64| {
+            let mut beside = place.clone();
+            // At a bound the difference is one-sided.
+            beside[k] = (place[k] + by).clamp(0.0, 1.0);
+            beside
+        };
+        let places: Vec<Vec<f64>> = (0..place.len()).flat_map(|k| [beside(k, -h), beside(k, h)]).collect();
+        let judged = self.landscape.judge(&places);
+        let count = judged.first().map_or(0, |j| j.slack.len());
+        let of = |j: &Judged, what: usize| if what == 0 { j.value } else { j.slack[what - 1] };
+        let slope = |what: usize| {
+            let along = |k: usize| {
+                let apart = places[2 * k + 1][k] - places[2 * k][k];
+                (of(&judged[2 * k + 1], what) - of(&judged[2 * k], what)) / apart
+            };
+            (0..place.len()).map(along).collect()
+        };
+        let slopes: Vec<Vec<f64>> = (0..=count).map(slope).collect();
+        self.slopes = Some((place, slopes.clone()));
+        slopes
+    }
+}
+
+fn cobyla(landscape: &mut dyn Landscape, start: &[f64], settings: &Settings) -> bool {
+    let memory = RefCell::new(Memory { landscape, last: None, slopes: None });
+    let value = |x: &[f64], _: &mut ()| memory.borrow_mut().judged(x).value;
+    let slack = |n: usize| {
+        let memory = &memory;
+        move |x: &[f64], _: &mut ()| memory.borrow_mut().judged(x).slack[n]
+    };
+    let slacks: Vec<_> = (0..settings.constraints).map(slack).collect();
+    let constraints: Vec<&dyn cobyla::Func<()>> = slacks.iter().map(|f| f as &dyn cobyla::Func<()>).collect();
+    let stop = cobyla::StopTols { xtol_abs: vec![settings.tolerance; start.len()], ..cobyla::StopTols::default() };
+    let bounds = vec![(0.0, 1.0); start.len()];
+    let first = cobyla::RhoBeg::All(settings.first_step);
+    let ended = cobyla::minimize(value, start, &bounds, &constraints, (), settings.evaluations, first, Some(stop));
+    let over = memory.borrow().landscape.is_over();
+    // Where rounding stops it, nothing more is to be had.
+    !over
+        && match ended {
+            Ok((status, ..)) => !matches!(status, cobyla::SuccessStatus::MaxEvalReached),
+            Err((status, ..)) => matches!(status, cobyla::FailStatus::RoundoffLimited),
+        }
+}
+
+fn slsqp(landscape: &mut dyn Landscape, start: &[f64], settings: &Settings) -> bool {
+    let memory = RefCell::new(Memory { landscape, last: None, slopes: None });
+    let value = |x: &[f64], gradient: Option<&mut [f64]>, _: &mut ()| {
+        let mut memory = memory.borrow_mut();
+        let value = memory.judged(x).value;
+        if let Some(gradient) = gradient {
+            gradient.copy_from_slice(&memory.slopes(x)[0]);
+        }
+        value
+    };
+    // Negative where it holds.
+    let slack = |n: usize| {
+        let memory = &memory;
+        move |x: &[f64], gradient: Option<&mut [f64]>, _: &mut ()| {
+            let mut memory = memory.borrow_mut();
+            let value = -memory.judged(x).slack[n];
+            if let Some(gradient) = gradient {
+                gradient.iter_mut().zip(&memory.slopes(x)[n + 1]).for_each(|(g, s)| *g = -s);
+            }
+            value
+        }
+    };
+    let slacks: Vec<_> = (0..settings.constraints).map(slack).collect();
+    let constraints: Vec<&dyn slsqp::Func<()>> = slacks.iter().map(|f| f as &dyn slsqp::Func<()>).collect();
+    let stop = slsqp::StopTols { xtol_abs: vec![settings.tolerance; start.len()], ..slsqp::StopTols::default() };
+    let bounds = vec![(0.0, 1.0); start.len()];
+    let ended = slsqp::minimize(value, start, &bounds, &constraints, (), settings.evaluations, Some(stop));
+    let over = memory.borrow().landscape.is_over();
+    !over
+        && match ended {
+            Ok((status, ..)) => !matches!(status, slsqp::SuccessStatus::MaxEvalReached),
+            Err((status, ..)) => matches!(status, slsqp::FailStatus::RoundoffLimited),
+        }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A function of places, and how often it was asked for.
+    struct Counted<F> {
+        function: F,
+        asked: usize,
+        most: usize,
+        best: (f64, Vec<f64>),
+    }
+
+    impl<F: Fn(&[f64]) -> Judged> Landscape for Counted<F> {
+        fn judge(&mut self, places: &[Vec<f64>]) -> Vec<Judged> {
+            self.asked += places.len();
+            assert!(places.iter().flatten().all(|x| (0.0..=1.0).contains(x)), "{places:?}");
+            let judged: Vec<Judged> = places.iter().map(|p| (self.function)(p)).collect();
+            for (place, found) in places.iter().zip(&judged) {
+                if found.slack.iter().all(|s| *s >= -1e-9) && found.value < self.best.0 {
+                    self.best = (found.value, place.clone());
+                }
+            }
+            judged
+        }
+        fn is_over(&self) -> bool {
+            self.asked >= self.most
+        }
+        fn difference(&self) -> f64 {
+            1e-4
+        }
+    }
+
+    fn least(optimiser: Optimiser, constraints: usize, start: &[f64], function: impl Fn(&[f64]) -> Judged) -> Vec<f64> {
+        let mut landscape = Counted { function, asked: 0, most: 2000, best: (f64::INFINITY, Vec::new()) };
+        let settings = Settings { optimiser, tolerance: 1e-6, first_step: 0.2, constraints, evaluations: 2000 };
+        assert!(search(&mut landscape, start, &settings), "{optimiser:?}: {} evaluations", landscape.asked);
+        landscape.best.1
+    }
+
+    #[test]
+    fn optima_of_closed_forms_are_found() {
+        for optimiser in [Optimiser::Cobyla, Optimiser::Slsqp] {
+            let near = |found: Vec<f64>, expected: &[f64], by: f64| {
+                let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(off < by, "{optimiser:?}: {found:?}, not {expected:?}");
+            };
+            // 1. A bowl, its axes across those of the cube. Linear models know the place of a parabola's bottom to the tolerance or so.
+            let bowl = |x: &[f64]| {
+                let (s, d) = (x[0] + x[1] - 1.0, x[0] - x[1] + 0.2);
+                Judged { value: 3.0 * s * s + 0.5 * d * d, slack: Vec::new() }
+            };
+            near(least(optimiser, 0, &[0.9, 0.1], bowl), &[0.4, 0.6], 1e-4);
+            // 2. A slope: a corner of the cube, to the last bit.
+            let slope = |x: &[f64]| Judged { value: x[0] - 2.0 * x[1], slack: Vec::new() };
+            near(least(optimiser, 0, &[0.5, 0.5], slope), &[0.0, 1.0], 1e-12);
+            // 3. The point of a circle that is farthest down (Lagrange): centre minus radius times (3, 4)/5.
+            let circle = |x: &[f64]| {
+                let r = (x[0] - 0.5).powi(2) + (x[1] - 0.5).powi(2);
+                Judged { value: 3.0 * x[0] + 4.0 * x[1], slack: vec![0.0625 - r] }
+            };
+            near(least(optimiser, 1, &[0.5, 0.6], circle), &[0.35, 0.3], 1e-4);
+        }
+    }
+}
