@@ -105,8 +105,8 @@ mod tests {
         let axis = Vec3::new(1.0, 2.0, -0.5).normalize();
         let zonal = zonal(&Charge(center + d), &center, &axis, 0.5 * d.norm());
         let expected = legendre(axis.dot(&d) / d.norm());
-        for l in 0..=HIGHEST {
-            let exact = expected[l] / d.norm().powi(l as i32 + 1);
+        for (l, expected) in expected.iter().enumerate() {
+            let exact = expected / d.norm().powi(l as i32 + 1);
             // The first degree that the rule takes for l is 32 - l, where the potential on the sphere of half the distance has
             // fallen to 2^(l - 32) of 1/d; A_l takes (2l + 1)/r^l of that, and of the next degrees together as much again.
             let alias = 2.0 * (2 * l + 1) as f64 * 2.0_f64.powi(l as i32 - 32) / d.norm();
