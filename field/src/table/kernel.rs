@@ -215,9 +215,9 @@ impl<L: Lanes, const REACH: usize> Run<'_, L, REACH> {
                     [a, b] => weights.contract(lanes, &[first, Self::window(numbers, found, 1)], &[a, b]),
                     _ => {
                         let mut sums = lanes.splat(0.0);
-                        for c in 0..channels {
+                        for (c, factor) in factors.iter().enumerate() {
                             let own = weights.contract(lanes, &[Self::window(numbers, found, c)], &[1.0]);
-                            sums = lanes.mul_add(own, lanes.splat(factors[c]), sums);
+                            sums = lanes.mul_add(own, lanes.splat(*factor), sums);
                         }
                         sums
                     }
