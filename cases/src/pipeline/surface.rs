@@ -2,6 +2,7 @@
 
 use meshes::import::{Format, ImportedMesh as Imported};
 use meshes::{Shape, SurfaceMesh, SurfaceTree, Triangulation, Vec3, triangulate, triangulate_to};
+use std::cell::OnceCell;
 
 use super::{Failure, Reporter};
 use crate::case::{Case, Drive, ElectrodeShape, GROUND, ImportedMesh, MeshFormat};
@@ -24,6 +25,9 @@ const TOUCH: f64 = 1e-9;
 
 /// Fineness at which electrodes that seem to touch are looked at again: facets of a sphere then stand off it by 3e-5 radii.
 const FINELY: f64 = 12.0;
+
+/// Facets of round surfaces stand off them by less than this share of their longest edges, if twelve or more go round.
+const STAND_OFF: f64 = 0.1;
 
 impl Electrodes {
     /// Reads imported meshes.
@@ -251,6 +255,15 @@ pub fn check_ground(mesh: &SurfaceMesh, case: &Case, source: &CaseSource) -> Res
     Ok(())
 }
 
+/// Longest edge of an electrode's panels, m.
+fn longest_edge(mesh: &SurfaceMesh, electrode: usize) -> f64 {
+    let edge = |panel: usize| {
+        let [a, b, c] = mesh.corners(panel);
+        (a - b).norm().max((b - c).norm()).max((c - a).norm())
+    };
+    mesh.panels_of(electrode).map(edge).fold(0.0, f64::max)
+}
+
 /// Refuses electrodes that touch or cut each other at different voltages. Facets keep the area of round surfaces and stand out
 /// of them here and there: with `curved`, where charges do not sit on facets, those that seem to touch are looked at more
 /// finely. Gives the names of the first two that touch at one voltage.
@@ -269,14 +282,19 @@ pub fn check_contacts<'a>(
     let mut joined = None;
     let touch = TOUCH * (hi - lo).norm();
     let trees: Vec<SurfaceTree> = (0..case.electrodes.len()).map(|e| SurfaceTree::of_electrode(mesh, e)).collect();
+    let fine: Vec<OnceCell<Option<SurfaceTree>>> = trees.iter().map(|_| OnceCell::new()).collect();
+    let finely = |e: usize| fine[e].get_or_init(|| electrodes.finely(case, e)).as_ref();
+    let stand_off = |e: usize| STAND_OFF * longest_edge(mesh, e);
     for i in 0..trees.len() {
         for j in i + 1..trees.len() {
-            let Some((_, p, _)) = trees[i].gap(&trees[j], touch) else { continue };
-            let finely = |e: usize| electrodes.finely(case, e);
-            if curved
-                && let (Some(one), Some(other)) = (finely(i), finely(j))
-                && one.gap(&other, touch).is_none()
-            {
+            // Facets may also hide that the surfaces cut each other.
+            let near = if curved { touch + stand_off(i) + stand_off(j) } else { touch };
+            let Some((_, p, _)) = trees[i].gap(&trees[j], near) else { continue };
+            let apart = match (finely(i), finely(j)) {
+                (Some(one), Some(other)) if curved => one.gap(other, touch).is_none(),
+                _ => curved && trees[i].gap(&trees[j], touch).is_none(),
+            };
+            if apart {
                 continue;
             }
             let (a, b) = (&case.electrodes[i], &case.electrodes[j]);

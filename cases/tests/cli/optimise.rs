@@ -233,3 +233,24 @@ fn cli_optimise_end_caps_for_a_pure_quadrupole() {
     // The next multipole is what is left.
     assert!(share(row, 8) > 1e-3, "{}", share(row, 8));
 }
+
+/// As near as two rings at different voltages can come: beyond, they touch.
+#[test]
+fn cli_optimise_steps_round_what_cannot_be() {
+    let scratch = Scratch::new();
+    let text = RINGS
+        .replace("\"A4^2 / 1e10\"", "\"half\"")
+        .replace("start = \"2 mm\"", "start = \"1.5 mm\"")
+        .replace("evaluations = 40", "evaluations = 15");
+    let apart = text.rfind("dc          = \"1 V\"").unwrap();
+    let text = format!("{}{}", &text[..apart], text[apart..].replacen("1 V", "2 V", 1));
+    let case = scratch.file("near.toml", &text);
+    let said = study(&case, &scratch.at("near"), &[]);
+    let json = said.json();
+    assert_eq!(said.status, Some(0), "{}", said.err);
+    let half = number(&json["best"], "half");
+    assert!((1.0..1.5).contains(&half), "{half}: wires of 1 mm touch at 1 mm");
+    let table = fs::read_to_string(Path::new(&scratch.at("near")).join("study.csv")).unwrap();
+    assert!(table.lines().any(|row| row.contains("touches or cuts")), "{table}");
+    assert!(said.err.contains("evaluations failed"), "{}", said.err);
+}
