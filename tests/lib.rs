@@ -117,7 +117,7 @@ impl TwoRings {
         let spacing = Some(2.0 * half / (bricks * CELLS_PER_BRICK) as f64);
         // The accuracy sets how exact the nodes are, here as exact as can be. Bricks that do not reach it with their spacing
         // are interpolated all the same: the table is to err by interpolation and by nothing else.
-        let options = TableOptions { min, max, accuracy: 1e-8, spacing, max_bytes: 1 << 30 };
+        let options = TableOptions { min, max, accuracy: 1e-8, spacing, max_bytes: 1 << 30, smooth: false };
         let mut table = tabulate(&basis, &options, &|_| ()).expect("a small table").0;
         table.tabulate_all();
         Self { basis, table, half }

@@ -28,7 +28,7 @@ pub const TABLE: &str = "cache/table.bin";
 const LARGEST_TABLE: u64 = 2 << 30;
 
 /// Raised when the same case gives other numbers than before, or the stored form changes.
-const EDITION: u32 = 3;
+const EDITION: u32 = 4;
 
 /// A digest: of what a file depends on, or of its content.
 pub type Digest = [u8; 32];
@@ -77,7 +77,11 @@ pub fn solution_key(case: &Case) -> Digest {
 /// Everything that a table depends on: its solution, its settings, its box and how small its bricks are beside conductors.
 pub fn table_key(case: &Case, plan: &Plan) -> Digest {
     let (min, max) = (plan.options.min, plan.options.max);
-    let numbers = min.iter().chain(max.iter()).flat_map(|x| x.to_le_bytes()).chain([plan.halvings]);
+    let numbers = min
+        .iter()
+        .chain(max.iter())
+        .flat_map(|x| x.to_le_bytes())
+        .chain([plan.halvings, u8::from(plan.options.smooth)]);
     let numbers: Vec<u8> = numbers.collect();
     digest(&[&solution_key(case), case.parts().table.as_bytes(), &numbers])
 }

@@ -47,7 +47,7 @@ fn tabulated(cells: usize) -> PotentialTable {
     let half = 0.6;
     let (min, max) = (Vec3::repeat(-half), Vec3::repeat(half));
     let spacing = Some(2.0 * half / cells as f64);
-    let options = TableOptions { min, max, accuracy: 1e-4, spacing, max_bytes: 1 << 32 };
+    let options = TableOptions { min, max, accuracy: 1e-4, spacing, max_bytes: 1 << 32, smooth: false };
     tabulate(&BASIS, &options, &|_| ()).expect("a small table").0
 }
 

@@ -71,6 +71,11 @@ pub trait BasisField: Send + Sync {
         scratch.sum(factors, potential, gradient);
     }
 
+    /// Whether its derivatives jump at many places, as those of a coarse interpolation do: then schemes of high order do not pay.
+    fn is_rough(&self) -> bool {
+        false
+    }
+
     /// The potential of every channel, if all of them are quadratic functions of position everywhere. They give what
     /// [`BasisField::sample`] gives, to rounding.
     ///

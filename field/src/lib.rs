@@ -36,6 +36,7 @@
 //!     accuracy: 1e-2,
 //!     spacing: None,
 //!     max_bytes: 1 << 28,
+//!     smooth: false,
 //! };
 //! let (table, report) = tabulate(&basis, &options, &|_| ())?;
 //! assert!(report.error() < 1e-2);

@@ -157,7 +157,7 @@ fn exact_table_above_a_plane() {
     let basis = solved(&mesh, Some(floor()), &[]);
     // The box reaches below the plane, and the plane cuts through cells.
     let (min, max) = (Vec3::new(-0.8, -0.8, -0.31), Vec3::new(0.8, 0.8, 1.4));
-    let options = TableOptions { min, max, accuracy: 1e-4, spacing: None, max_bytes: 1 << 28 };
+    let options = TableOptions { min, max, accuracy: 1e-4, spacing: None, max_bytes: 1 << 28, smooth: false };
     let (table, report) = field::tabulate(&basis, &options, &|_| ()).unwrap();
     assert!(report.error() <= 1e-4, "{report:?}");
     let mut next = random(5);

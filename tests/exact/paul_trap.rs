@@ -42,7 +42,7 @@ fn paper_paul_trap_ejection() {
     assert!((a2 * R0 * R0 + 1.0).abs() < 2e-3, "A2 r0² = {}", a2 * R0 * R0);
     // 3. The table between the electrodes, the exact sum next to them, and the electrodes to strike.
     let (min, max) = (Vec3::new(-0.5, -0.5, -0.75) * R0, Vec3::new(0.5, 0.5, 0.75) * R0);
-    let options = TableOptions { min, max, accuracy: 1e-4, spacing: None, max_bytes: 1 << 28 };
+    let options = TableOptions { min, max, accuracy: 1e-4, spacing: None, max_bytes: 1 << 28, smooth: false };
     let (table, report) = tabulate(&basis, &options, &|_| ()).unwrap();
     println!("{report:?}");
     let field = Arc::new(TabulatedField::combined(&basis, &table, &on_ring));

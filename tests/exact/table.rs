@@ -39,7 +39,8 @@ fn exact_table_at_a_64th_of_the_region() {
     for Geometry { name, mesh, half } in geometries() {
         let basis = BoundaryProblem::new(&mesh).solve().unwrap();
         let (min, max, spacing) = (Vec3::repeat(-half), Vec3::repeat(half), half / 32.0);
-        let options = TableOptions { min, max, accuracy: 1e-4, spacing: Some(spacing), max_bytes: 1 << 30 };
+        let options =
+            TableOptions { min, max, accuracy: 1e-4, spacing: Some(spacing), max_bytes: 1 << 30, smooth: false };
         let (table, report) = tabulate(&basis, &options, &|_| ()).unwrap();
         assert_eq!(table.grid().cells.map(|n| n * CELLS_PER_BRICK), [64; 3]);
         let exact = basis.panel_sum();
@@ -80,6 +81,7 @@ fn exact_table_outside_and_next_to_conductors() {
         accuracy: 1e-3,
         spacing: Some(0.05),
         max_bytes: 1 << 30,
+        smooth: false,
     };
     let (table, _) = tabulate(&basis, &options, &|_| ()).unwrap();
     let field = TabulatedField::combined(&basis, &table, &[vec![2.0, -1.0]]);
@@ -119,7 +121,7 @@ fn exact_table_of_a_grid_plate_has_small_cells_where_they_count() {
     ]);
     let basis = BoundaryProblem::new(&mesh).solve().unwrap();
     let (min, max) = (Vec3::new(-0.4, -0.4, -0.5), Vec3::new(0.4, 0.4, 0.5));
-    let options = TableOptions { min, max, accuracy: 1e-3, spacing: None, max_bytes: 1 << 29 };
+    let options = TableOptions { min, max, accuracy: 1e-3, spacing: None, max_bytes: 1 << 29, smooth: false };
     let (small, report) = tabulate(&basis, &options, &|_| ()).unwrap();
     // A table of cells of one size with no fewer nodes, held to nothing: its layer is as thin as can be.
     let mut spacing = 0.1;

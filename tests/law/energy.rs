@@ -151,7 +151,7 @@ fn law_energy_across_the_edge_of_the_table() {
     let rings = TwoRings::tabulated(4);
     let (min, max) = (Vec3::repeat(-1.2), Vec3::repeat(1.2));
     // Cells of one size: with smaller ones beside the wire the grain would not leave them.
-    let options = TableOptions { min, max, accuracy: 1e-4, spacing: Some(0.02), max_bytes: 1 << 30 };
+    let options = TableOptions { min, max, accuracy: 1e-4, spacing: Some(0.02), max_bytes: 1 << 30, smooth: false };
     let (table, report) = tabulate(&rings.basis, &options, &|_| ()).unwrap();
     let basis = Arc::new(TabulatedField::combined(&rings.basis, &table, &[vec![1.0, 1.0]]));
     let system = System::new()

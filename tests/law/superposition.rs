@@ -48,6 +48,7 @@ fn law_weighted_fields_are_weighted_sums_of_unit_fields() {
         accuracy: 1e-3,
         spacing: Some(0.1),
         max_bytes: 1 << 28,
+        smooth: false,
     };
     let table = tabulate(&basis, &options, &|_| ()).unwrap().0;
     let identity: Vec<Vec<f64>> = (0..3).map(|k| (0..3).map(|l| f64::from(u8::from(k == l))).collect()).collect();

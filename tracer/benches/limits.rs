@@ -253,7 +253,8 @@ fn interpolation() {
     let mesh = SurfaceMesh::assemble([ring("below", -1.0), ring("above", 1.0)]);
     let basis = BoundaryProblem::new(&mesh).solve().expect("sound rings");
     let (min, max) = (Vec3::repeat(-0.6), Vec3::repeat(0.6));
-    let options = TableOptions { min, max, accuracy: 1e-6, spacing: Some(1.2 / 64.0), max_bytes: 1 << 32 };
+    let options =
+        TableOptions { min, max, accuracy: 1e-6, spacing: Some(1.2 / 64.0), max_bytes: 1 << 32, smooth: false };
     let (seconds, (mut table, _)) = timed(|| tabulate(&basis, &options, &|_| ()).expect("a small table"));
     table.tabulate_all();
     let exact = Arc::new(basis.combined(&[vec![1.0, 1.0]]));

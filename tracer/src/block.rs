@@ -52,6 +52,10 @@ pub(crate) struct Trial {
     pub step: f64,
     /// s.
     pub end: f64,
+    /// Time from its start to the next corner of the forces or the end of the run, s.
+    pub room: f64,
+    /// Longest step that the run allows, s.
+    pub longest: f64,
     /// Whether it is the first of even steps.
     pub first: bool,
     /// How many steps of length `step` it stands for.
@@ -107,6 +111,16 @@ impl<'a> Block<'a> {
     /// Acceleration of everything, drag and magnetic field with the forces, m/s².
     pub fn whole_acceleration(&self, lane: usize, motion: &Motion) -> Vec3 {
         motion.acceleration + self.linear[lane].acceleration(&motion.velocity)
+    }
+
+    /// What a step that ends there may err in position (m) and velocity (m/s): the tolerance relative to the way that the grain has
+    /// come so far and to its highest speed.
+    pub fn allowed(&self, lane: usize, position: &Vec3, velocity: &Vec3) -> [f64; 2] {
+        let state = &self.state[lane];
+        let moved = (position - state.motion.position).norm().max((position - state.origin).norm());
+        let length = state.travel.max(moved).max(self.least_travel);
+        let speed = state.top_speed.max(velocity.norm());
+        [(self.tolerance * length).max(4.0 * f64::EPSILON * position.amax()), self.tolerance * speed]
     }
 
     /// Keeps the grains for which `keep` is true, in their order.

@@ -60,7 +60,7 @@ pub(crate) fn estimate(
     let (mut tighter, tightened) = (
         options.clone(),
         match options.method {
-            Method::Dop853 => Tightened::Tolerance,
+            method if method.is_adaptive() => Tightened::Tolerance,
             _ => Tightened::Step,
         },
     );

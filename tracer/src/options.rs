@@ -31,6 +31,8 @@ pub enum Method {
     /// Störmer's multistep scheme of order 12: one force a step, dense output, for smooth forces without magnetic field. In a Paul
     /// trap 1e-6 after 1000 periods takes 36 forces a period.
     Stoermer12,
+    /// The same scheme with steps from the tolerance, begun by `Dop853`: for grains that feel each other, whose forces are dear.
+    Stoermer,
 }
 
 /// Called with the fraction that is done, from 0 to 1, at most about a thousand times, from any thread.

@@ -110,6 +110,7 @@ impl System {
         self.forces.iter().map(|f| f.nature()).fold(Nature::default(), |a, b| Nature {
             couples_grains: a.couples_grains || b.couples_grains,
             needs_velocity: a.needs_velocity || b.needs_velocity,
+            rough: a.rough || b.rough,
             shortest_period: match (a.shortest_period, b.shortest_period) {
                 (Some(x), Some(y)) => Some(x.min(y)),
                 (x, y) => x.or(y),

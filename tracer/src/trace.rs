@@ -8,13 +8,14 @@ use rayon::prelude::*;
 use crate::block::Block;
 use crate::checkpoint::{Flying, Landed};
 use crate::flight::{BlockResult, LEAST_TRAVEL, Loop, Run};
+use crate::force::coulomb::MANY;
 use crate::integrator::boris::Boris;
 use crate::integrator::dop853::Dop853;
 use crate::integrator::langevin::Langevin;
 use crate::integrator::linear_splitting::LinearSplitting;
 use crate::integrator::scheme::{BLANES_MOAN_4, BLANES_MOAN_6, BLANES_MOAN_14, Scheme, VERLET};
 use crate::integrator::splitting::Splitting;
-use crate::integrator::stoermer::Stoermer;
+use crate::integrator::stoermer::{AdaptiveStoermer, Stoermer};
 use crate::progress::Meter;
 use crate::{Ending, Ensemble, ErrorEstimate, Method, Observer, Options, Standing, System, TraceError};
 
@@ -57,10 +58,10 @@ pub fn trace(
     observer: &dyn Observer,
 ) -> Result<Traced, TraceError> {
     options.check()?;
-    let method = resolve(system, options)?;
+    let method = resolve(system, ensemble.len(), options)?;
     let step = match options.step {
         Some(step) => step,
-        None if method == Method::Dop853 || ensemble.is_empty() => options.duration,
+        None if method.is_adaptive() || ensemble.is_empty() => options.duration,
         None if options.method == Method::Auto && method == Method::BlanesMoan14 => {
             linear_step(system, ensemble, options)?
         }
@@ -75,12 +76,12 @@ pub fn trace(
     if let Some(listener) = options.progress.as_ref().filter(|_| !options.cancelled()) {
         listener(1.0);
     }
-    traced.step = (method != Method::Dop853).then_some(step);
+    traced.step = (!method.is_adaptive()).then_some(step);
     Ok(traced)
 }
 
 /// The integrator to use, if it can do what is asked.
-fn resolve(system: &System, options: &Options) -> Result<Method, TraceError> {
+fn resolve(system: &System, grains: usize, options: &Options) -> Result<Method, TraceError> {
     let refuse = |method, reason, advice| Err(TraceError::Method { method, reason, advice });
     if let Some(temperature) = system.noise {
         if !(temperature.is_finite() && temperature >= 0.0) {
@@ -91,23 +92,31 @@ fn resolve(system: &System, options: &Options) -> Result<Method, TraceError> {
             return refuse("noise", "there is no drag", "set the drag of the gas that makes the noise");
         }
     }
+    let nature = system.nature();
+    // What the multistep can do: forces known from the positions, with many derivatives.
+    let smooth = system.magnetic_field == Vec3::zeros() && !nature.needs_velocity && !nature.rough;
     let method = match (options.method, system.noise) {
         (Method::Auto, Some(_)) => Method::Langevin,
         (Method::Auto, None) if options.max_step.is_none() && system.linear_form().is_some() => Method::BlanesMoan14,
+        (Method::Auto, None) if smooth && nature.couples_grains && (DEAR..=MANY).contains(&grains) => Method::Stoermer,
         (Method::Auto, None) => Method::Dop853,
         (method, _) => method,
     };
     if system.noise.is_some() && method != Method::Langevin {
         return refuse(method.name(), "there is noise", "use langevin, or leave the noise out");
     }
-    if method == Method::Stoermer12 && system.magnetic_field != Vec3::zeros() {
+    if matches!(method, Method::Stoermer | Method::Stoermer12) && system.magnetic_field != Vec3::zeros() {
         return refuse(method.name(), "there is a magnetic field", "use dop853, or leave the field out");
     }
-    if method != Method::Dop853 && system.nature().needs_velocity {
+    if method != Method::Dop853 && nature.needs_velocity {
         return refuse(method.name(), "a force depends on the velocity", "use dop853");
     }
     Ok(method)
 }
+
+/// Grains from which on their mutual forces are so dear that `Auto` takes the multistep, if the other forces are smooth. Above
+/// [`MANY`](crate::force::coulomb::MANY) these forces themselves jump.
+pub const DEAR: usize = 100;
 
 /// Where a run stands that was never begun.
 static NOWHERE: Standing = Standing::new();
@@ -144,17 +153,19 @@ pub(crate) fn run(
     run.meter.add(standing.landed.len() as f64 * options.duration + flown);
     let all: Vec<usize> = (0..ensemble.len()).filter(|grain| !standing.landed.contains_key(grain)).collect();
     let results: Vec<Result<BlockResult, TraceError>> = if shared {
-        vec![fly(&run, &all)]
+        // From one of the pool's own threads: others sleep and are woken for every force.
+        vec![rayon::scope(|_| fly(&run, &all))]
     } else {
         // Blocks small enough that all threads have some.
         let share = all.len().div_ceil(2 * rayon::current_num_threads()).max(1);
         // In linear forces the coefficients of a step are found once for a block: they should not cost more than its grains.
         let block = if run.linear.is_some() { 8 * options.block } else { options.block };
-        let size = block.min(share);
+        // The multistep has one step for all grains of a block.
+        let size = if options.method == Method::Stoermer { 1 } else { block.min(share) };
         // Steps that are not each grain's own are those of a whole block: only grains that stand at the same moment share one.
         let mut moments: BTreeMap<Option<[u64; 4]>, Vec<usize>> = BTreeMap::new();
         for grain in all {
-            let flying = standing.flying.get(&grain).filter(|_| options.method != Method::Dop853);
+            let flying = standing.flying.get(&grain).filter(|_| !options.method.is_adaptive());
             moments.entry(flying.map(Flying::moment)).or_default().push(grain);
         }
         let blocks: Vec<&[usize]> = moments.values().flat_map(|grains| grains.chunks(size)).collect();
@@ -204,6 +215,7 @@ fn fly(run: &Run, grains: &[usize]) -> Result<BlockResult, TraceError> {
         Method::BlanesMoan6 => split(run, &BLANES_MOAN_6, grains),
         Method::BlanesMoan14 => split(run, &BLANES_MOAN_14, grains),
         Method::Stoermer12 => Loop::new(run, Stoermer::new(), grains)?.fly(),
+        Method::Stoermer => Loop::new(run, AdaptiveStoermer::new(), grains)?.fly(),
     }
 }
 
@@ -305,7 +317,13 @@ impl Method {
             Self::BlanesMoan6 => "blanes-moan-6",
             Self::BlanesMoan14 => "blanes-moan-14",
             Self::Stoermer12 => "stoermer-12",
+            Self::Stoermer => "stoermer",
         }
+    }
+
+    /// Whether its steps follow the error.
+    pub fn is_adaptive(self) -> bool {
+        matches!(self, Self::Auto | Self::Dop853 | Self::Stoermer)
     }
 
     /// Order of the error of a run in the step (weak order for `Langevin`); of the method that `Auto` takes without noise.
@@ -315,7 +333,7 @@ impl Method {
             Self::Verlet | Self::Boris | Self::Langevin => 2,
             Self::BlanesMoan4 => 4,
             Self::BlanesMoan6 | Self::BlanesMoan14 => 6,
-            Self::Stoermer12 => 12,
+            Self::Stoermer12 | Self::Stoermer => 12,
         }
     }
 
@@ -323,7 +341,7 @@ impl Method {
     /// they leave 3e-3, 5e-7 and 2e-8 of the excursion for orders 2, 4 and 6.
     fn steps_per_period(self) -> f64 {
         match self {
-            Self::Auto | Self::Dop853 => 20.0,
+            Self::Auto | Self::Dop853 | Self::Stoermer => 20.0,
             Self::Verlet | Self::Boris | Self::Langevin => 200.0,
             Self::BlanesMoan4 => 40.0,
             Self::BlanesMoan6 => 20.0,

@@ -8,7 +8,7 @@ use tracer::{Drag, DragLaw, Gas, Method, Options, Outcome, Region, System};
 
 /// The methods that share the deterministic tests, with a step in units of the RF period (or none) and the error that
 /// the step gives on the Mathieu trajectories below, relative to the largest excursion.
-const METHODS: [(Method, Option<f64>, f64); 7] = [
+const METHODS: [(Method, Option<f64>, f64); 8] = [
     // A thousand steps of 1e-13.
     (Method::Dop853, None, 2e-11),
     // (Ω h)² / 24 in the phase of at most 60 rad, and twice that where the motion grows.
@@ -21,6 +21,7 @@ const METHODS: [(Method, Option<f64>, f64); 7] = [
     // At 20 steps.
     (Method::BlanesMoan14, Some(1.0 / 20.0), 2e-9),
     (Method::Stoermer12, Some(1.0 / 60.0), 2e-9),
+    (Method::Stoermer, None, 2e-11),
 ];
 
 #[test]
@@ -388,6 +389,7 @@ fn exact_two_grains_collide_as_kepler_says() {
         (Method::Verlet, 2e4, 1e-5),
         (Method::BlanesMoan6, 2e3, 1e-8),
         (Method::Stoermer12, 4e3, 1e-8),
+        (Method::Stoermer, 1.0, 1e-10),
     ] {
         let options = Options { step: Some(time / steps), ..options(method, time) };
         let traced = run(&system, &grains, &options);

@@ -142,6 +142,35 @@ fn order_stoermer() {
 }
 
 #[test]
+fn order_adaptive_stoermer() {
+    // Forty periods of a Paul trap, damped or not: what is left of the tolerance, and how many forces that takes.
+    for (q, k) in [(0.4, 0.0), (0.4, 0.05), (0.7, 0.0)] {
+        let system = mathieu(0.05, q).with_drag(Drag::Rate(2.0 * k));
+        let grains = ensemble([grain(v(1.0, 0.4, 0.0), v(0.3, -0.2, 0.1), 1.0, 1.0)]);
+        let time = 40.0 * std::f64::consts::PI;
+        let fly = |method, tolerance| run(&system, &grains, &Options { tolerance, ..options(method, time) });
+        let best = fly(Method::Dop853, 1e-14);
+        let flown: Vec<(f64, u64)> = [1e-7, 1e-9, 1e-11]
+            .into_iter()
+            .map(|tolerance| {
+                let (multiple, single) = (fly(Method::Stoermer, tolerance), fly(Method::Dop853, tolerance));
+                let error = (multiple.ensemble.positions()[0] - best.ensemble.positions()[0]).norm();
+                // Some 2000 steps, each within the tolerance; velocities in units of a radian of the drive.
+                assert!(error < 100.0 * tolerance, "q = {q}, k = {k}: {error:e} at {tolerance:e}");
+                // The start takes 300 forces; what follows, a third to a half of what Dop853 takes.
+                let forces = multiple.force_evaluations;
+                assert!(forces < single.force_evaluations * 2 / 3, "{forces}, {}", single.force_evaluations);
+                (error, forces)
+            })
+            .collect();
+        // Order 12: a hundredth of the tolerance takes steps shorter by the thirteenth root of that, 1.43; the start counts too.
+        let growth = flown[2].1 as f64 / flown[1].1 as f64;
+        assert!((1.1..1.6).contains(&growth), "q = {q}, k = {k}: {flown:?}");
+        assert!(flown[2].0 < 0.1 * flown[0].0, "{flown:?}");
+    }
+}
+
+#[test]
 fn order_dop853() {
     // A loose tolerance accepts every step at its longest; the few shorter ones at the start, while the control lets steps
     // grow, move the slope a little, and so does the next term, only h smaller: half.
@@ -198,6 +227,7 @@ fn order_is_kept_across_corners_of_a_waveform() {
         Method::BlanesMoan6,
         Method::BlanesMoan14,
         Method::Stoermer12,
+        Method::Stoermer,
     ] {
         let options = Options { step: Some(0.3), ..options(method, 20.0) };
         let (r, w) = end(&system, v(0.0, 0.0, 0.0), v(0.0, 0.0, 0.0), &options);

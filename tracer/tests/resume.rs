@@ -74,6 +74,8 @@ fn law_resumed_flights_end_with_the_same_bits() {
         ("symplectic", &alone, Method::BlanesMoan6),
         ("multistep", &alone, Method::Stoermer12),
         ("coupled, multistep", &coupled, Method::Stoermer12),
+        ("adaptive multistep", &alone, Method::Stoermer),
+        ("coupled, adaptive multistep", &coupled, Method::Stoermer),
         ("noise", &noisy, Method::Langevin),
         ("coupled", &coupled, Method::Dop853),
         ("coupled, fixed steps", &coupled, Method::Verlet),
@@ -82,7 +84,7 @@ fn law_resumed_flights_end_with_the_same_bits() {
         let options = Options {
             method,
             duration: 0.05,
-            step: (method != Method::Dop853).then_some(2e-5),
+            step: (!method.is_adaptive()).then_some(2e-5),
             every: Some(1e-3),
             block: 7,
             ..Options::default()

@@ -234,6 +234,8 @@ pub enum Integrator {
     Symplectic6,
     /// Multistep of order 12, one force a step, for smooth forces without magnetic field.
     Stoermer12,
+    /// The same with steps from the accuracy, for grains that feel each other.
+    Stoermer,
 }
 
 /// `[output]`

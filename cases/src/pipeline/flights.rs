@@ -318,6 +318,7 @@ pub fn fly(
             Integrator::Symplectic4 => Method::BlanesMoan4,
             Integrator::Symplectic6 => Method::BlanesMoan6,
             Integrator::Stoermer12 => Method::Stoermer12,
+            Integrator::Stoermer => Method::Stoermer,
         },
         start: settings.start,
         duration: settings.duration,

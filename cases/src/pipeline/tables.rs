@@ -2,16 +2,18 @@
 
 use std::time::Instant;
 
-use field::{ElectrodeBasis, PotentialTable, TableError, TableOptions, TableReport, halvings_for, tabulate_around};
+use field::{
+    ElectrodeBasis, PotentialTable, TableError, TableOptions, TableReport, Waveform, halvings_for, tabulate_around,
+};
 
 use meshes::Vec3;
 use serde::{Deserialize, Serialize};
-use tracer::{Ensemble, Group, Launch, Place};
+use tracer::{DEAR, Ensemble, Group, Launch, MANY, Place};
 
 use super::ready::{table_memory, table_too_large};
 use super::{Failure, Reporter, region};
 use crate::CaseSource;
-use crate::case::Case;
+use crate::case::{Case, Integrator};
 
 /// A table and how long it took. What is stored of it is the same whenever its [`Plan`] is.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -61,10 +63,31 @@ impl Plan {
             accuracy: case.table.accuracy,
             spacing: case.table.spacing,
             max_bytes: table_memory(case),
+            smooth: many_coupled_flights(case),
         };
         let halvings = halvings_for(basis, &options, &starts(case));
         Self { options, halvings }
     }
+}
+
+/// Whether grains that feel each other fly so long that a smooth table, which takes about four times the bricks, is soon paid back: the
+/// multistep needs a third of the forces that `Dop853` does, but not where derivatives jump from cell to cell.
+fn many_coupled_flights(case: &Case) -> bool {
+    /// Pairs of a flight that take half a minute.
+    const PAIRS: f64 = 3e10;
+    /// Forces that `Dop853` takes in a period of the drives, in clouds at rest.
+    const FORCES: f64 = 200.0;
+    let Some(trace) = case.trace.as_ref().filter(|_| case.forces.coulomb && case.forces.langevin.is_none()) else {
+        return false;
+    };
+    let able = matches!(trace.integrator, Integrator::Auto | Integrator::Stoermer);
+    let grains: usize = case.grains.iter().map(|group| group.count).sum();
+    let (waveforms, _) = case.given();
+    let Some(period) = waveforms.iter().filter_map(Waveform::shortest_period).min_by(f64::total_cmp) else {
+        return false;
+    };
+    let pairs = (grains as f64).powi(2) * FORCES * trace.duration / period;
+    able && case.forces.magnetic_field == Vec3::zeros() && (DEAR..=MANY).contains(&grains) && pairs > PAIRS
 }
 
 fn too_large(case: &Case, source: &CaseSource, error: TableError) -> Failure {

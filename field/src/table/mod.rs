@@ -47,8 +47,10 @@ pub struct PotentialTable {
     pub octree: Octree,
     /// Number of functions.
     pub channels: usize,
-    /// Accuracy of the field that was asked for; from [`SMOOTH`] on splines are of degree five.
+    /// Accuracy of the field that was asked for.
     pub accuracy: f64,
+    /// Splines are of degree five: from [`SMOOTH`] on, and where that was asked for.
+    pub smooth: bool,
     /// Potential and derivatives at the nodes, in units of the coarsest bricks: entry `(node * channels + channel) * 27 + a + 3 b + 9 c`
     /// is ∂_x^a ∂_y^b ∂_z^c.
     pub nodes: Vec<f64>,
@@ -93,7 +95,7 @@ impl PotentialTable {
             let brick = octree.brick_mut(number);
             (brick.corners, brick.tabulated) = (corners, true);
         }
-        Self { octree, channels, accuracy, nodes }
+        Self { octree, channels, accuracy, smooth: accuracy <= SMOOTH, nodes }
     }
 
     /// Whether there are as many numbers as the bricks have nodes; a table that was read from somewhere may lie.
@@ -131,10 +133,10 @@ impl PotentialTable {
 
     /// Bytes that [`tabulate`] takes at its peak for a grid of bricks, and flights after it: what nodes hold, a third more for what
     /// is computed but not yet stored, and splines of all functions.
-    pub fn bytes_while_filling(bricks: &Grid, functions: usize, accuracy: f64) -> u64 {
+    pub fn bytes_while_filling(bricks: &Grid, functions: usize, smooth: bool) -> u64 {
         let nodes = (8 * PER_NODE as u64 * functions as u64).saturating_mul(bricks.nodes() as u64);
         let bricks = bricks.cells.iter().fold(1, |n: usize, c| n.saturating_mul(*c));
-        let splines = Splines::bytes_for(reach_for(accuracy), bricks, functions);
+        let splines = Splines::bytes_for(reach_for(smooth), bricks, functions);
         (nodes / 3).saturating_mul(4).saturating_add(splines)
     }
 
@@ -148,14 +150,15 @@ impl PotentialTable {
 /// where this much is asked cubic ones would need more than that many more bricks.
 pub const SMOOTH: f64 = 3e-5;
 
-/// What the splines of a table of that accuracy are.
-fn reach_for(accuracy: f64) -> usize {
-    if accuracy <= SMOOTH { spline::QUINTIC } else { spline::CUBIC }
+/// What the splines of a table are.
+fn reach_for(smooth: bool) -> usize {
+    if smooth { spline::QUINTIC } else { spline::CUBIC }
 }
 
 /// A table with the exact sum for what it does not cover.
 pub struct TabulatedField {
     kernel: Kernel,
+    smooth: bool,
     /// The same channels exactly, sources included.
     pub exact: Arc<PanelSum>,
 }
@@ -168,7 +171,11 @@ impl TabulatedField {
 
     /// A table's functions combined to channels, with what is exact for the same channels.
     pub fn new(table: &PotentialTable, weights: &[Vec<f64>], exact: Arc<PanelSum>) -> Self {
-        Self { kernel: Kernel::new(&table.octree, Splines::new(table, reach_for(table.accuracy), weights)), exact }
+        Self {
+            kernel: Kernel::new(&table.octree, Splines::new(table, reach_for(table.smooth), weights)),
+            smooth: table.smooth,
+            exact,
+        }
     }
 
     /// Bytes of the splines.
@@ -188,6 +195,10 @@ impl TabulatedField {
 impl BasisField for TabulatedField {
     fn channels(&self) -> usize {
         self.kernel.channels()
+    }
+
+    fn is_rough(&self) -> bool {
+        !self.smooth
     }
 
     fn sample(&self, points: &[Vec3], samples: &mut Samples) {

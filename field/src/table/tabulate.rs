@@ -29,8 +29,18 @@ pub struct TableOptions {
     pub accuracy: f64,
     /// Size of a cell, m, the same everywhere; `None`: chosen so that the accuracy is reached, smaller where the field needs it.
     pub spacing: Option<f64>,
+    /// Splines of degree five also where the accuracy does not ask for them ([`SMOOTH`](super::SMOOTH)): forces then are so smooth that
+    /// multistep schemes can use them.
+    pub smooth: bool,
     /// Bytes that may be used. A spacing that is given is refused when it needs more; one that is chosen stops shrinking.
     pub max_bytes: u64,
+}
+
+impl TableOptions {
+    /// Whether splines are of degree five.
+    pub fn is_smooth(&self) -> bool {
+        self.smooth || self.accuracy <= super::SMOOTH
+    }
 }
 
 /// Why there is no table.
@@ -121,7 +131,7 @@ pub fn tabulate_around(
     let functions = basis.functions();
     let bytes = |spacing: f64| {
         let bricks = PotentialTable::bricks_for(options.min, options.max, spacing);
-        (bricks, PotentialTable::bytes_while_filling(&bricks, functions, options.accuracy))
+        (bricks, PotentialTable::bytes_while_filling(&bricks, functions, options.is_smooth()))
     };
     let (grid, needed) = bytes(spacing);
     if needed > options.max_bytes {
@@ -152,6 +162,7 @@ pub fn tabulate_around(
             octree: Octree::new(grid),
             channels: functions,
             accuracy: options.accuracy,
+            smooth: options.is_smooth(),
             nodes: Vec::new(),
         },
         ids: HashMap::new(),
@@ -265,7 +276,7 @@ impl Maker<'_> {
         if !brick.is_filled() {
             return Vec::new();
         }
-        let (n, reach) = (self.table.channels, reach_for(self.options.accuracy));
+        let (n, reach) = (self.table.channels, reach_for(self.options.is_smooth()));
         let of = |node: u32, c: usize| {
             let first = (node as usize * n + c) * PER_NODE;
             &self.table.nodes[first..first + PER_NODE]
@@ -367,7 +378,7 @@ impl Maker<'_> {
             let n = self.table.channels;
             let bricks = self.table.octree.all().len() + 8 * all.len();
             let bytes = (8 * PER_NODE * n * nodes) as u64 / 3 * 4
-                + Splines::bytes_for(reach_for(self.options.accuracy), bricks, n);
+                + Splines::bytes_for(reach_for(self.options.is_smooth()), bricks, n);
             if nodes <= most_nodes && bytes <= self.options.max_bytes {
                 for number in all {
                     self.table.octree.halve(number);

@@ -35,7 +35,7 @@ fn random() -> impl FnMut() -> f64 {
 const ACCURACIES: [f64; 2] = [1e-3, 1e-6];
 
 fn kernel(table: &PotentialTable, weights: &[Vec<f64>]) -> Kernel {
-    Kernel::new(&table.octree, Splines::new(table, reach_for(table.accuracy), weights))
+    Kernel::new(&table.octree, Splines::new(table, reach_for(table.smooth), weights))
 }
 
 /// Potential and gradient of all channels.
@@ -178,7 +178,7 @@ fn a_box_too_long_for_its_cells_is_refused() {
     let basis =
         crate::BoundaryProblem::new(&meshes::SurfaceMesh::assemble([("ball".to_owned(), ball)])).solve().unwrap();
     let (min, max) = (Vec3::new(2.0, -1e-6, -1e-6), Vec3::new(12.0, 1e-6, 1e-6));
-    let options = TableOptions { min, max, accuracy: 1e-3, spacing: Some(1e-6), max_bytes: u64::MAX };
+    let options = TableOptions { min, max, accuracy: 1e-3, spacing: Some(1e-6), max_bytes: u64::MAX, smooth: false };
     let refused = tabulate(&basis, &options, &|_| ()).unwrap_err();
     let TableError::TooFine { cells, most, spacing_that_fits } = refused else { panic!("{refused}") };
     assert!(cells > most && (10.0 / spacing_that_fits) < most as f64, "{refused}");

@@ -227,6 +227,8 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
             }
             let state = &self.block.state[lane];
             let l = &mut self.lanes[lane];
+            let stop = self.run.options.end().min(l.pace.corner);
+            let room = stop - state.time;
             let (step, end) = if self.nature.adaptive {
                 if l.pace.wanted == 0.0 {
                     let first = |(state, linear)| self.run.first_step(state, linear);
@@ -236,8 +238,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
                         first((state, &self.block.linear[lane]))
                     };
                 }
-                let stop = self.run.options.end().min(l.pace.corner);
-                let (room, step) = (stop - state.time, l.pace.wanted.min(self.run.max_step));
+                let step = self.integrator.asks().unwrap_or(l.pace.wanted).min(self.run.max_step);
                 // Never leave a remainder that is a small part of a step.
                 let end = if step >= room * (1.0 - 1e-12) {
                     stop
@@ -250,7 +251,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
             } else {
                 if l.pace.grid.taken == l.pace.grid.count {
                     let sample = if self.nature.dense { f64::INFINITY } else { self.run.sample_time(l.pace.sample) };
-                    let stop = self.run.options.end().min(l.pace.corner).min(sample);
+                    let stop = stop.min(sample);
                     l.pace.grid = Grid::new(state.time, stop, self.run.step.min(self.run.max_step));
                 }
                 (l.pace.grid.step, l.pace.grid.next_end())
@@ -258,6 +259,7 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
             let trial = &mut self.block.trial[lane];
             (trial.step, trial.end, trial.number, trial.error) = (step, end, l.pace.number, 0.0);
             (trial.steps, trial.first) = (1, l.pace.grid.taken == 0);
+            (trial.room, trial.longest) = (room, self.run.max_step);
         }
     }
 

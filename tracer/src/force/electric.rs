@@ -27,7 +27,11 @@ impl Electric {
 
 impl Force for Electric {
     fn nature(&self) -> Nature {
-        Nature { shortest_period: self.field.shortest_period(), ..Nature::default() }
+        Nature {
+            shortest_period: self.field.shortest_period(),
+            rough: self.field.basis().is_rough(),
+            ..Nature::default()
+        }
     }
 
     fn add(&self, batch: &Batch, scratch: &mut Scratch, force: &mut [Vec3]) {

@@ -4,6 +4,7 @@ pub mod coulomb;
 pub mod electric;
 pub mod image_charge;
 pub mod linear_form;
+mod pairs;
 pub mod uniform;
 
 use field::Samples;
@@ -66,6 +67,8 @@ pub struct Nature {
     pub couples_grains: bool,
     /// It depends on the velocity: then integrators that split cannot be used.
     pub needs_velocity: bool,
+    /// Its derivatives jump at many places: then schemes of high order do not pay.
+    pub rough: bool,
     /// Its shortest period, s.
     pub shortest_period: Option<f64>,
 }

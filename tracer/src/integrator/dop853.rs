@@ -150,18 +150,15 @@ impl Integrator for Dop853 {
         self.arch.dispatch(Combine { weights: SOLUTION_3, k, out: three });
         // `sum` still holds the weighted sum of the solution.
         for lane in 0..n {
-            let state = block.state[lane];
-            let trial = &mut block.trial[lane];
-            let (r, v, h) = (self.stage.position[lane], self.stage.velocity[lane], trial.step);
+            let (r, v) = (self.stage.position[lane], self.stage.velocity[lane]);
+            let allowed = block.allowed(lane, &r, &v);
+            let (state, trial) = (&block.state[lane], &mut block.trial[lane]);
+            let h = trial.step;
             trial.motion = Motion { position: r, velocity: v, acceleration: self.acceleration[lane] };
             trial.fresh = true;
             // The motion bends with the strongest acceleration seen at the stages; twice that allows for what lies
             // between them.
             trial.reach = state.motion.velocity.norm() * h + trial.reach.sqrt() * h * h;
-            let moved = (r - state.motion.position).norm().max((r - state.origin).norm());
-            let length = state.travel.max(moved).max(block.least_travel);
-            let speed = state.top_speed.max(v.norm());
-            let allowed = [(block.tolerance * length).max(4.0 * f64::EPSILON * r.amax()), block.tolerance * speed];
             let (mut five, mut three) = (0.0, 0.0);
             for (part, allowed) in allowed.into_iter().enumerate() {
                 let (e5, s3) = (vector(&self.error[0], part * n + lane), vector(&self.error[1], part * n + lane));

@@ -6,6 +6,7 @@
 //! | `Verlet` | 2 | fixed | long runs, symplectic; stiff drag |
 //! | `Boris` | 2 | fixed | the customary scheme in magnetic fields |
 //! | `Langevin` | 2 (weak) | fixed | noise |
+//! | `Stoermer` | 12 | adaptive | grains that feel each other |
 //! | `Stoermer12` | 12 | fixed | smooth fields that are dear: one force a step |
 //! | `BlanesMoan4`, `BlanesMoan6`, `BlanesMoan14` | 4, 6, 6 | fixed | long runs, symplectic, accurate |
 
@@ -34,6 +35,11 @@ pub(crate) trait Integrator {
     /// steps that all lie between the same corners and samples. `false` when the integrator cannot, and nothing is done.
     fn leap(&mut self, _block: &mut Block, _ends: &[f64]) -> bool {
         false
+    }
+
+    /// The length of the next step (s), where it is not for the loop's control of errors to choose.
+    fn asks(&self) -> Option<f64> {
+        None
     }
 
     /// Told when grains leave the block, those whose flag is false; and whether the others' forces change by that, so that

@@ -19,6 +19,7 @@ fn a_table_is_the_sum_that_it_was_filled_from() {
         accuracy: 1e-3,
         spacing: None,
         max_bytes: 1 << 27,
+        smooth: false,
     };
     let (table, report) = tabulate(&basis, &options, &|_| ()).unwrap();
     assert!(report.error() <= 1e-3, "{report:?}");
