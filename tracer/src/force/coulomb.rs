@@ -66,9 +66,7 @@ impl Force for Coulomb {
             }
             return;
         }
-        for (i, (f, field)) in force.iter_mut().zip(pairs::field(batch, &mut scratch.numbers)).enumerate() {
-            *f += field * (COULOMB * batch.charge[i]);
-        }
+        pairs::field(batch, &mut scratch.numbers, |i, field| force[i] += field * (COULOMB * batch.charge[i]));
     }
 
     fn add_energy(&self, batch: &Batch, _: &mut Scratch, energy: &mut [f64]) {

@@ -28,24 +28,25 @@ const WORTH_SHARING: usize = 20_000;
 /// a fixed order, in columns that vectors of two, four and eight numbers can all keep, without fused operations; and what
 /// stripes did to each other is added up in their order.
 ///
-/// `memory` is scratch. Checked by `the_fast_sum_is_the_slow_sum`, `every_width_of_vector_gives_the_same_bits`.
-pub(super) fn field(batch: &Batch, memory: &mut Vec<f64>) -> Vec<Vec3> {
+/// Told grain by grain, in parts that are to be added up; `memory` is scratch. Checked by `the_fast_sum_is_the_slow_sum`,
+/// `every_width_of_vector_gives_the_same_bits`.
+pub(super) fn field(batch: &Batch, memory: &mut Vec<f64>, mut add: impl FnMut(usize, Vec3)) {
     let arch = Arch::new();
     let grains = Grains::new(batch, memory);
     let stripes = Stripes::new(grains.count);
     let one = |stripe| arch.dispatch(Stripe { grains: &grains, stripes: &stripes, stripe });
-    let parts: Vec<Sums> = if grains.count * grains.count < WORTH_SHARING {
-        (0..stripes.count).map(one).collect()
-    } else {
-        (0..stripes.count).into_par_iter().map(one).collect()
-    };
-    let mut field = vec![Vec3::zeros(); grains.count];
-    for Sums([x, y, z]) in &parts {
-        for (i, field) in field.iter_mut().enumerate() {
-            *field += Vec3::new(x[i], y[i], z[i]);
+    let mut tell = |sums: Sums| {
+        let [x, y, z] = sums.parts();
+        for i in 0..grains.count {
+            add(i, Vec3::new(x[i], y[i], z[i]));
         }
+    };
+    if grains.count * grains.count < WORTH_SHARING {
+        (0..stripes.count).map(one).for_each(tell);
+    } else {
+        let parts: Vec<Sums> = (0..stripes.count).into_par_iter().map(one).collect();
+        parts.into_iter().for_each(&mut tell);
     }
-    field
 }
 
 /// Positions and charges in arrays of their own, filled up to whole tiles with uncharged grains far away.
@@ -107,8 +108,24 @@ impl Stripes {
     }
 }
 
-/// x, y and z of a sum at every grain, padded as they are.
-struct Sums([Vec<f64>; 3]);
+/// x, y and z of a sum at every grain, padded as they are, one after the other.
+struct Sums(Vec<f64>);
+
+impl Sums {
+    fn parts(&self) -> [&[f64]; 3] {
+        let (x, rest) = self.0.split_at(self.0.len() / 3);
+        let (y, z) = rest.split_at(x.len());
+        [x, y, z]
+    }
+
+    #[inline(always)]
+    fn parts_mut(&mut self) -> [&mut [f64]; 3] {
+        let third = self.0.len() / 3;
+        let (x, rest) = self.0.split_at_mut(third);
+        let (y, z) = rest.split_at_mut(third);
+        [x, y, z]
+    }
+}
 
 /// All that the grains of a stripe and those they meet do to each other.
 struct Stripe<'a> {
@@ -126,8 +143,7 @@ impl WithSimd for Stripe<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Sums {
         let Self { grains: g, stripes, stripe } = self;
-        let n = g.x.len();
-        let mut sums = Sums([vec![0.0; n], vec![0.0; n], vec![0.0; n]]);
+        let mut sums = Sums(vec![0.0; 3 * g.x.len()]);
         let mut reaction: Reaction = [[0.0; TILE * COLUMNS]; 3];
         let own = stripes.tiles_of(stripe);
         for target in own.clone() {
@@ -156,7 +172,7 @@ impl WithSimd for Stripe<'_> {
 /// Adds up the columns and what they hold to the sources' sums.
 #[inline(always)]
 fn take(reaction: &Reaction, source: usize, sums: &mut Sums) {
-    for (sum, reaction) in sums.0.iter_mut().zip(reaction) {
+    for (sum, reaction) in sums.parts_mut().into_iter().zip(reaction) {
         for (sum, r) in sum[source * TILE..].iter_mut().zip(reaction.chunks_exact(COLUMNS)) {
             *sum -= ((r[0] + r[1]) + (r[2] + r[3])) + ((r[4] + r[5]) + (r[6] + r[7]));
         }
@@ -181,7 +197,7 @@ fn tile<S: Simd, const SAME: bool>(
     let (z, _) = S::as_simd_f64s(&g.z[targets.clone()]);
     let (charge, _) = S::as_simd_f64s(&g.charge[targets.clone()]);
     let (number, _) = S::as_simd_f64s(&g.number[targets.clone()]);
-    let [sum_x, sum_y, sum_z] = &mut sums.0;
+    let [sum_x, sum_y, sum_z] = sums.parts_mut();
     let (sum_x, _) = S::as_mut_simd_f64s(&mut sum_x[targets.clone()]);
     let (sum_y, _) = S::as_mut_simd_f64s(&mut sum_y[targets.clone()]);
     let (sum_z, _) = S::as_mut_simd_f64s(&mut sum_z[targets]);
@@ -193,7 +209,9 @@ fn tile<S: Simd, const SAME: bool>(
     // Vectors of a row of columns. Two rows at a time: their chains of root and division overlap, and all sums stay in registers.
     // (No closures here: what they hold would not be compiled for wide vectors.)
     let row = COLUMNS / S::F64_LANES;
-    for first in (0..x.len()).step_by(2 * row) {
+    // Nothing is summed for the places that fill up the last tile, but for those in its last rows.
+    let filled = (g.count - target * TILE).min(TILE).div_ceil(S::F64_LANES);
+    for first in (0..filled).step_by(2 * row) {
         for v in first..first + row {
             let w = v + row;
             let (ax, ay, az, a_charge, a_number) = (x[v], y[v], z[v], charge[v], number[v]);
@@ -289,7 +307,7 @@ mod tests {
                 others.extend(pulp::x86::V4::try_new().map(|simd| Simd::vectorize(simd, task())));
             }
             for other in others {
-                for (a, b) in one.0.iter().zip(&other.0) {
+                for (a, b) in one.parts().into_iter().zip(other.parts()) {
                     assert_eq!(a[..333], b[..333]);
                 }
             }
