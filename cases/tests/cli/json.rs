@@ -92,7 +92,7 @@ fn cli_json_of_check_and_mesh() {
     assert_eq!(electrodes.len(), 2);
     for electrode in electrodes {
         // A torus: 4 pi² R a, but for what coarse polygons around it and along it change; closed, its normals outwards.
-        let area = electrode["area"].as_f64().unwrap() / (4.0 * std::f64::consts::PI.powi(2) * 1e-2 * 1e-3);
+        let area = electrode["area"].as_f64().unwrap() / (4.0 * std::f64::consts::PI.powi(2) * 1e-2 * 2.5e-3);
         assert!((area - 1.0).abs() < 0.1, "{area}");
         assert_eq!((electrode["open_edges"].as_u64(), electrode["bad_edges"].as_u64()), (Some(0), Some(0)));
         assert_eq!(electrode["outward"], true);
