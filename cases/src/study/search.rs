@@ -25,6 +25,9 @@ pub trait Landscape {
     /// Whether nothing more may be asked.
     fn is_over(&self) -> bool;
 
+    /// The best place of those that were asked for and hold all constraints.
+    fn best(&self) -> Option<Vec<f64>>;
+
     /// Distance (part of the range) of central differences: where the error of the values and that of the differences are alike.
     fn difference(&self) -> f64;
 }
@@ -38,10 +41,60 @@ pub struct Settings {
     pub tolerance: f64,
     /// The size of the first steps, as part of each range.
     pub first_step: f64,
+    /// Whether something is varied in steps: then there are no slopes.
+    pub steps: bool,
     /// How many constraints there are.
     pub constraints: usize,
     /// How many places may be asked for.
     pub evaluations: usize,
+}
+
+/// To what part of each range linear models search before other models go on from there: over a valley they come to rest where it is
+/// as wide as their steps, hundreds of tolerances from its lowest place (`valleys_are_followed_to_the_tolerance`).
+const COARSE: f64 = 0.01;
+
+/// First steps of linear models that start again at the best place; each time again, a quarter of that.
+const SECOND_STEP: f64 = 0.04;
+
+/// The least of them, in tolerances.
+const LEAST_STEP: f64 = 4.0;
+
+impl Settings {
+    /// The tolerance of a search after which [`settle`] is to follow.
+    pub fn coarse(&self) -> f64 {
+        if self.optimiser == Optimiser::Cobyla { self.tolerance.max(COARSE) } else { self.tolerance }
+    }
+}
+
+/// Starts again at the best place, with fresh steps, until that moves it by no more than the tolerance in any direction; gives whether
+/// it came to that. By slopes and, unless the study is sure of those, by linear models in turn: the first find the bottom of a smooth
+/// valley, the second go on where there are kinks and where constraints meet, and both have to stay where they are.
+///
+/// Checked by `valleys_are_followed_to_the_tolerance`.
+pub fn settle(landscape: &mut dyn Landscape, settings: &Settings) -> bool {
+    let methods = match settings.optimiser {
+        Optimiser::Slsqp => &[Optimiser::Slsqp][..],
+        Optimiser::Cobyla if settings.steps => &[Optimiser::Cobyla],
+        Optimiser::Cobyla => &[Optimiser::Slsqp, Optimiser::Cobyla],
+    };
+    let mut step = SECOND_STEP;
+    let mut at_rest = 0;
+    for optimiser in methods.iter().copied().cycle() {
+        let Some(start) = landscape.best().filter(|_| !landscape.is_over()) else { break };
+        let first_step = step.max(LEAST_STEP * settings.tolerance);
+        let ended = search(landscape, &start, &Settings { optimiser, first_step, ..*settings });
+        if optimiser == Optimiser::Cobyla {
+            step *= 0.25;
+        }
+        let now = landscape.best().unwrap_or_else(|| start.clone());
+        let moved = now.iter().zip(&start).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        at_rest = if moved <= settings.tolerance { at_rest + 1 } else { 0 };
+        if at_rest == methods.len() {
+            // Where slopes lead nowhere at all, linear models have the last word.
+            return ended || methods.len() > 1 && !landscape.is_over();
+        }
+    }
+    false
 }
 
 /// Searches from a place; gives whether the place came to be known to the tolerance. What was found is in the landscape's own memory.
@@ -51,6 +104,9 @@ pub fn search(landscape: &mut dyn Landscape, start: &[f64], settings: &Settings)
         Optimiser::Slsqp => slsqp(landscape, start, settings),
     }
 }
+
+/// Of values and slacks of the order of one.
+const NOWHERE: f64 = 1e6;
 
 /// The last place that was asked for, so that objective and constraints are told of one evaluation.
 struct Memory<'l> {
@@ -62,6 +118,9 @@ struct Memory<'l> {
 
 impl Memory<'_> {
     fn judged(&mut self, place: &[f64]) -> Judged {
+        if !place.iter().all(|x| x.is_finite()) {
+            return self.nowhere();
+        }
         let place: Vec<f64> = place.iter().map(|x| x.clamp(0.0, 1.0)).collect();
         if let Some((known, judged)) = &self.last
             && *known == place
@@ -73,7 +132,17 @@ impl Memory<'_> {
         judged
     }
 
+    /// What is told of a place that is none: quadratic models without a slope lead there. Worse than all that was found.
+    fn nowhere(&self) -> Judged {
+        let slack = self.last.as_ref().map_or(0, |(_, judged)| judged.slack.len());
+        Judged { value: NOWHERE, slack: vec![-NOWHERE; slack] }
+    }
+
     fn slopes(&mut self, place: &[f64]) -> Vec<Vec<f64>> {
+        if !place.iter().all(|x| x.is_finite()) {
+            let count = 1 + self.nowhere().slack.len();
+            return vec![vec![0.0; place.len()]; count];
+        }
         let place: Vec<f64> = place.iter().map(|x| x.clamp(0.0, 1.0)).collect();
         if let Some((known, slopes)) = &self.slopes
             && *known == place
@@ -188,16 +257,68 @@ mod tests {
         fn is_over(&self) -> bool {
             self.asked >= self.most
         }
+        fn best(&self) -> Option<Vec<f64>> {
+            self.best.0.is_finite().then(|| self.best.1.clone())
+        }
         fn difference(&self) -> f64 {
-            1e-4
+            1e-3
         }
     }
 
+    fn counted<F>(function: F, most: usize) -> Counted<F> {
+        Counted { function, asked: 0, most, best: (f64::INFINITY, Vec::new()) }
+    }
+
+    fn settings(optimiser: Optimiser, tolerance: f64, constraints: usize) -> Settings {
+        Settings { optimiser, tolerance, first_step: 0.2, steps: false, constraints, evaluations: 2000 }
+    }
+
     fn least(optimiser: Optimiser, constraints: usize, start: &[f64], function: impl Fn(&[f64]) -> Judged) -> Vec<f64> {
-        let mut landscape = Counted { function, asked: 0, most: 2000, best: (f64::INFINITY, Vec::new()) };
-        let settings = Settings { optimiser, tolerance: 1e-6, first_step: 0.2, constraints, evaluations: 2000 };
+        let mut landscape = counted(function, 2000);
+        let settings = settings(optimiser, 1e-6, constraints);
         assert!(search(&mut landscape, start, &settings), "{optimiser:?}: {} evaluations", landscape.asked);
         landscape.best.1
+    }
+
+    #[test]
+    fn valleys_are_followed_to_the_tolerance() {
+        // Across the axes of the cube, steeper across than along by up to 300, smooth or with a kink, about thirty places; and with a
+        // wall through them, on which the lowest place is where both slopes along it balance.
+        type Form = fn(f64, f64, f64) -> f64;
+        let smooth: Form = |k, u, v| k * u * u + v * v;
+        let kinked: Form = |k, u, v| k * u.abs() + v.abs();
+        let tolerance = 1e-4;
+        for (form, steep, wall, most, tolerances) in [
+            (smooth, 1.0, false, 100, 1.0),
+            (smooth, 6.0, false, 150, 1.0),
+            (smooth, 300.0, false, 150, 1.0),
+            (smooth, 6.0, true, 300, 1.0),
+            // The edge of a fold has no slope: linear models alone walk along it.
+            (kinked, 6.0, false, 300, 2.0),
+        ] {
+            for n in 0..30 {
+                let at = [0.3 + 0.013 * f64::from(n), 0.62 - 0.007 * f64::from(n)];
+                let expected = if wall { [at[0] - 0.1, at[1] + 0.1 * (steep - 1.0) / (steep + 1.0)] } else { at };
+                let function = |x: &[f64]| {
+                    let (x, y) = (x[0] - at[0], x[1] - at[1]);
+                    let slack = if wall { vec![-0.1 - x] } else { Vec::new() };
+                    Judged { value: form(steep, x + y, x - y), slack }
+                };
+                for optimiser in [Optimiser::Cobyla, Optimiser::Slsqp] {
+                    if optimiser == Optimiser::Slsqp && (wall || tolerances > 1.0) {
+                        continue;
+                    }
+                    let mut landscape = counted(function, 1000);
+                    let settings = settings(optimiser, tolerance, usize::from(wall));
+                    search(&mut landscape, &[0.5, 0.5], &Settings { tolerance: settings.coarse(), ..settings });
+                    let case = format!("{optimiser:?}, {steep}, {wall}, {n}: {} evaluations", landscape.asked);
+                    assert!(settle(&mut landscape, &settings), "{case}");
+                    let off = landscape.best.1.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    assert!(off <= tolerances * tolerance, "{case}: {off}");
+                    assert!(landscape.asked <= most, "{case}, then {}", landscape.asked);
+                }
+            }
+        }
     }
 
     #[test]

@@ -36,7 +36,9 @@ pub(super) fn plate(
     let fine = Fineness { along, across };
     let width = step.max(bar);
     let sheet = match (outline, hole) {
-        (Outline::Rectangle(size), Hole::Square | Hole::Slot) => rectangular_in_rectangle(size, pitch, hole, open, &fine),
+        (Outline::Rectangle(size), Hole::Square | Hole::Slot) => {
+            rectangular_in_rectangle(size, pitch, hole, open, &fine)
+        }
         (Outline::Rectangle(size), Hole::Round) => round_in_rectangle(size, pitch, open, &fine),
         _ => {
             let mut work = Patchwork::default();
