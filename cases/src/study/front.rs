@@ -25,8 +25,8 @@ pub struct Front {
     grids: Vec<Grid>,
     /// Places in `grids`, from dark to bright.
     front: Vec<usize>,
-    /// The last from which more light costs little.
-    knee: usize,
+    /// The last from which more light costs little; none where the front has no bend towards the better.
+    knee: Option<usize>,
     /// The best of the user's own weighting.
     optimum: usize,
     /// The name of the number that tells the transparency.
@@ -50,7 +50,7 @@ impl Front {
         let front = front(&grids);
         let cost = |grid: &Grid| weighing.weight * (1.0 - grid.light) + grid.deviation / weighing.tolerated;
         let optimum = (0..grids.len()).min_by(|a, b| cost(&grids[*a]).total_cmp(&cost(&grids[*b])))?;
-        let knee = knee(&grids, &front)?;
+        let knee = knee(&grids, &front);
         Some(Self { front, knee, optimum, grids, light, tolerated: weighing.tolerated })
     }
 
@@ -60,7 +60,7 @@ impl Front {
         json!({
             "transparency": self.light,
             "front": self.front.iter().map(|grid| point(*grid)).collect::<Vec<_>>(),
-            "knee": point(self.knee),
+            "knee": self.knee.map(point),
             "optimum": point(self.optimum),
         })
     }
@@ -89,10 +89,13 @@ impl Front {
             None => format!("none is within {:.2} % of the field", 100.0 * self.tolerated),
         };
         format!(
-            "of {} grids {} are surpassed by none in both light and field; the knee: {}; {budget}; the best by the study's weights: {}",
+            "of {} grids {} are surpassed by none in both light and field; {}; {budget}; the best by the study's weights: {}",
             self.grids.len(),
             self.front.len(),
-            told(self.knee),
+            self.knee.map_or("there is no knee between the ends of these".to_owned(), |knee| format!(
+                "the knee: {}",
+                told(knee)
+            )),
             told(self.optimum)
         )
     }
@@ -122,7 +125,7 @@ impl Front {
         };
         let marks = vec![
             mark("surpassed by none", self.front.clone(), Shape::Circle),
-            mark("knee", vec![self.knee], Shape::Triangle),
+            mark("knee", self.knee.into_iter().collect(), Shape::Triangle),
             mark("best by weight", vec![self.optimum], Shape::Cross),
         ];
         let budget = (100.0 * self.tolerated).log10();
@@ -150,6 +153,9 @@ impl Front {
 /// Curves in one panel: colours but the one of the budget.
 const MOST_CURVES: usize = 6;
 
+/// What is on the line between the ends but for rounding is not below it, in units of the front's extent.
+const ROUNDING: f64 = 1e-9;
+
 /// The grids that none surpasses, from dark to bright.
 fn front(grids: &[Grid]) -> Vec<usize> {
     let surpasses = |a: &Grid, b: &Grid| {
@@ -162,7 +168,7 @@ fn front(grids: &[Grid]) -> Vec<usize> {
 }
 
 /// The grid of the front furthest below the line between its ends, light against the logarithm of the deviation, both in units of
-/// the front's extent.
+/// the front's extent; `None` where none is below it: an end of the front is no knee.
 ///
 /// Source: Das 1999, the normal-boundary characterisation of the knee. Checked by `the_front_and_its_knee`.
 fn knee(grids: &[Grid], front: &[usize]) -> Option<usize> {
@@ -173,7 +179,8 @@ fn knee(grids: &[Grid], front: &[usize]) -> Option<usize> {
         let part = |x: f64, whole: f64| if whole > 0.0 { x / whole } else { 0.0 };
         part(grids[*n].light - first.light, width) - part(height(&grids[*n]) - height(first), rise)
     };
-    front.iter().copied().max_by(|a, b| below(a).total_cmp(&below(b)))
+    let lowest = front.iter().copied().max_by(|a, b| below(a).total_cmp(&below(b)))?;
+    (below(&lowest) > ROUNDING).then_some(lowest)
 }
 
 #[cfg(test)]
@@ -189,6 +196,13 @@ mod tests {
         let found = front(&grids);
         assert_eq!(found, [0, 1, 4]);
         assert_eq!(knee(&grids, &found), Some(1));
-        assert_eq!(knee(&grids[..1], &front(&grids[..1])), Some(0));
+        // One alone, two, and three that bend the other way have none.
+        let none = |points: &[(f64, f64)]| {
+            let grids: Vec<Grid> = points.iter().copied().enumerate().map(grid).collect();
+            assert_eq!(knee(&grids, &front(&grids)), None, "{points:?}");
+        };
+        none(&points[..1]);
+        none(&points[..2]);
+        none(&[(0.5, 1e-3), (0.6, 5e-2), (0.95, 1e-1)]);
     }
 }

@@ -173,8 +173,11 @@ impl Landscape for Climb<'_, '_> {
         self.failure.is_some() || self.rows.len() >= self.until
     }
 
-    fn best(&self) -> Option<Vec<f64>> {
-        self.best_row().map(|row| self.places[row].clone())
+    fn best(&self) -> Option<(Vec<f64>, Judged)> {
+        let violation = |row: &usize| self.judged[*row].slack.iter().fold(0.0_f64, |m, s| m.max(-s));
+        let done = (0..self.rows.len()).filter(|row| self.rows[*row].reason().is_none());
+        let nearest = || done.min_by(|a, b| violation(a).total_cmp(&violation(b)));
+        self.best_row().or_else(nearest).map(|row| (self.places[row].clone(), self.judged[row].clone()))
     }
 
     /// Central differences of a function known to ε are off by h² from its bends and by ε/h from the errors: h = ε^(1/3).

@@ -25,8 +25,8 @@ pub trait Landscape {
     /// Whether nothing more may be asked.
     fn is_over(&self) -> bool;
 
-    /// The best place of those that were asked for and hold all constraints.
-    fn best(&self) -> Option<Vec<f64>>;
+    /// The best place of those that were asked for and hold all constraints; where none does, the one that breaks them least.
+    fn best(&self) -> Option<(Vec<f64>, Judged)>;
 
     /// Distance (part of the range) of central differences: where the error of the values and that of the differences are alike.
     fn difference(&self) -> f64;
@@ -53,21 +53,22 @@ pub struct Settings {
 /// as wide as their steps, hundreds of tolerances from its lowest place (`valleys_are_followed_to_the_tolerance`).
 const COARSE: f64 = 0.01;
 
-/// First steps of linear models that start again at the best place; each time again, a quarter of that.
+/// First steps of linear models that start again at the best place: at most these, else so many times what the search before moved it,
+/// or the tolerance.
 const SECOND_STEP: f64 = 0.04;
-
-/// The least of them, in tolerances.
-const LEAST_STEP: f64 = 4.0;
+const OF_LAST_MOVE: f64 = 4.0;
 
 impl Settings {
-    /// The tolerance of a search after which [`settle`] is to follow.
+    /// The tolerance of a search after which [`settle`] is to follow. Where constraints meet linear models are right, and what these leave
+    /// may be narrower than coarse steps.
     pub fn coarse(&self) -> f64 {
-        if self.optimiser == Optimiser::Cobyla { self.tolerance.max(COARSE) } else { self.tolerance }
+        let is_coarse = self.optimiser == Optimiser::Cobyla && self.constraints == 0;
+        if is_coarse { self.tolerance.max(COARSE) } else { self.tolerance }
     }
 }
 
-/// Starts again at the best place, with fresh steps, until that moves it by no more than the tolerance in any direction; gives whether
-/// it came to that. By slopes and, unless the study is sure of those, by linear models in turn: the first find the bottom of a smooth
+/// Starts again at the best place, with fresh steps, until that moves it by no more than the tolerance in any direction, or makes it
+/// better by no more than the square of that (over a parabola as high as it is wide they are the same); gives whether it came to that. By slopes and, unless the study is sure of those, by linear models in turn: the first find the bottom of a smooth
 /// valley, the second go on where there are kinks and where constraints meet, and both have to stay where they are.
 ///
 /// Checked by `valleys_are_followed_to_the_tolerance`.
@@ -77,18 +78,18 @@ pub fn settle(landscape: &mut dyn Landscape, settings: &Settings) -> bool {
         Optimiser::Cobyla if settings.steps => &[Optimiser::Cobyla],
         Optimiser::Cobyla => &[Optimiser::Slsqp, Optimiser::Cobyla],
     };
-    let mut step = SECOND_STEP;
+    let mut moved = f64::INFINITY;
     let mut at_rest = 0;
     for optimiser in methods.iter().copied().cycle() {
-        let Some(start) = landscape.best().filter(|_| !landscape.is_over()) else { break };
-        let first_step = step.max(LEAST_STEP * settings.tolerance);
+        let Some((start, before)) = landscape.best().filter(|_| !landscape.is_over()) else { break };
+        let first_step = (OF_LAST_MOVE * moved.max(settings.tolerance)).min(SECOND_STEP.max(settings.tolerance));
         let ended = search(landscape, &start, &Settings { optimiser, first_step, ..*settings });
-        if optimiser == Optimiser::Cobyla {
-            step *= 0.25;
-        }
-        let now = landscape.best().unwrap_or_else(|| start.clone());
-        let moved = now.iter().zip(&start).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        at_rest = if moved <= settings.tolerance { at_rest + 1 } else { 0 };
+        let (now, after) = landscape.best().unwrap_or_else(|| (start.clone(), before.clone()));
+        moved = now.iter().zip(&start).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        // What breaks constraints may get worse to hold them.
+        let gain = if before.slack.iter().all(|s| *s >= 0.0) { before.value - after.value } else { f64::INFINITY };
+        let is_at_rest = moved <= settings.tolerance || gain <= settings.tolerance * settings.tolerance;
+        at_rest = if is_at_rest { at_rest + 1 } else { 0 };
         if at_rest == methods.len() {
             // Where slopes lead nowhere at all, linear models have the last word.
             return ended || methods.len() > 1 && !landscape.is_over();
@@ -105,6 +106,10 @@ pub fn search(landscape: &mut dyn Landscape, start: &[f64], settings: &Settings)
     }
 }
 
+/// Places are told apart to this part of the tolerance: a search that stays within it costs nothing more. Not so where constraints meet,
+/// which may be in no place that is told apart.
+const APART: f64 = 1.0 / 16.0;
+
 /// Of values and slacks of the order of one.
 const NOWHERE: f64 = 1e6;
 
@@ -114,14 +119,30 @@ struct Memory<'l> {
     last: Option<(Vec<f64>, Judged)>,
     /// The same with derivatives: of the value, then of each slack.
     slopes: Option<(Vec<f64>, Vec<Vec<f64>>)>,
+    /// Where the search starts, and how far apart the places are that are asked for.
+    start: Vec<f64>,
+    apart: f64,
 }
 
-impl Memory<'_> {
+impl<'l> Memory<'l> {
+    fn new(landscape: &'l mut dyn Landscape, start: &[f64], settings: &Settings) -> Self {
+        let apart = if settings.constraints == 0 { APART * settings.tolerance } else { 0.0 };
+        Self { landscape, last: None, slopes: None, start: start.to_vec(), apart }
+    }
+
+    /// Within the bounds, and one of the places that are told apart; bounds are.
+    fn place(&self, place: &[f64]) -> Vec<f64> {
+        let near = |x: f64, from: f64| from + ((x - from) / self.apart).round() * self.apart;
+        let told =
+            |(x, from): (&f64, &f64)| if self.apart > 0.0 && *x > 0.0 && *x < 1.0 { near(*x, *from) } else { *x };
+        place.iter().zip(&self.start).map(told).map(|x| x.clamp(0.0, 1.0)).collect()
+    }
+
     fn judged(&mut self, place: &[f64]) -> Judged {
         if !place.iter().all(|x| x.is_finite()) {
             return self.nowhere();
         }
-        let place: Vec<f64> = place.iter().map(|x| x.clamp(0.0, 1.0)).collect();
+        let place = self.place(place);
         if let Some((known, judged)) = &self.last
             && *known == place
         {
@@ -143,7 +164,7 @@ impl Memory<'_> {
             let count = 1 + self.nowhere().slack.len();
             return vec![vec![0.0; place.len()]; count];
         }
-        let place: Vec<f64> = place.iter().map(|x| x.clamp(0.0, 1.0)).collect();
+        let place = self.place(place);
         if let Some((known, slopes)) = &self.slopes
             && *known == place
         {
@@ -174,7 +195,7 @@ impl Memory<'_> {
 }
 
 fn cobyla(landscape: &mut dyn Landscape, start: &[f64], settings: &Settings) -> bool {
-    let memory = RefCell::new(Memory { landscape, last: None, slopes: None });
+    let memory = RefCell::new(Memory::new(landscape, start, settings));
     let value = |x: &[f64], _: &mut ()| memory.borrow_mut().judged(x).value;
     let slack = |n: usize| {
         let memory = &memory;
@@ -196,7 +217,7 @@ fn cobyla(landscape: &mut dyn Landscape, start: &[f64], settings: &Settings) -> 
 }
 
 fn slsqp(landscape: &mut dyn Landscape, start: &[f64], settings: &Settings) -> bool {
-    let memory = RefCell::new(Memory { landscape, last: None, slopes: None });
+    let memory = RefCell::new(Memory::new(landscape, start, settings));
     let value = |x: &[f64], gradient: Option<&mut [f64]>, _: &mut ()| {
         let mut memory = memory.borrow_mut();
         let value = memory.judged(x).value;
@@ -257,8 +278,9 @@ mod tests {
         fn is_over(&self) -> bool {
             self.asked >= self.most
         }
-        fn best(&self) -> Option<Vec<f64>> {
-            self.best.0.is_finite().then(|| self.best.1.clone())
+        fn best(&self) -> Option<(Vec<f64>, Judged)> {
+            let (value, place) = &self.best;
+            value.is_finite().then(|| (place.clone(), (self.function)(place)))
         }
         fn difference(&self) -> f64 {
             1e-3
