@@ -411,5 +411,7 @@ fn flights(
     let surface = obstacles(mesh, case.field.ground.as_ref(), &region);
     let induction = induction(case, source, &ready.electrodes, &**quiet)?;
     let reporter: Arc<dyn Reporter> = quiet.clone();
-    fly(case, settings, source, driven.field, induction, surface, &ready.ensemble, region, None, &reporter).map(Some)
+    // Rows tell where grains are and how fast, not what pushes them.
+    fly(case, settings, source, driven.field, induction, surface, &ready.ensemble, region, false, None, &reporter)
+        .map(Some)
 }
