@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::harness::{Scratch, file, graintrap, number, study, tiny};
+use crate::harness::{Scratch, file, graintrap, killed_with, number, study, tiny};
 
 #[test]
 fn cli_study_finds_the_penetration_length_and_the_shadow_of_a_grid() {
@@ -109,6 +109,76 @@ sampling = "zip"
     let case = scratch.file("none.toml", &text);
     let said = graintrap(&["study", &case, "--set", "study.kind=grid_transparency", "-o", &scratch.at("no")]);
     assert!(said.err.contains("study.kind: the case has no grid to study"), "{}", said.err);
+}
+
+#[test]
+fn cli_study_of_strikes_goes_on_after_a_kill() {
+    let scratch = Scratch::new();
+    // Grains that feel nothing fall onto two by two whole cells of crossed wires, and see of them what light does.
+    let text = r#"
+[[electrode]]
+name        = "grid"
+shape       = "grid_plate"
+size        = [3, 3]
+pitch       = 1
+wires       = "crossed"
+wire_radius = 0.2
+
+[[electrode]]
+name   = "top"
+shape  = "plate"
+size   = [3, 3]
+center = [0, 0, 2]
+dc     = 1
+
+[field]
+accuracy = 5e-2
+
+[table]
+min      = [-1, -1, -1]
+max      = [1, 1, 1]
+spacing  = 0.5
+accuracy = 0.5
+
+[[grains]]
+count  = 60
+mass   = "1 kg"
+charge = "1e-30 C"
+place  = { kind = "box", min = [-1, -1, 0.6], max = [1, 1, 0.7] }
+speed  = { kind = "uniform", velocity = [0, 0, -1] }
+
+[trace]
+duration = 1.5
+
+[study]
+kind   = "grid_transparency"
+center = [0, 0, 1.2]
+radius = 0.3
+lines  = 1
+rays   = 100
+
+[sweep]
+"grains.1.count" = [60, 70, 80]
+"#;
+    let case = scratch.file("crossed.toml", text);
+    let (whole, cut) = (scratch.at("whole"), scratch.at("cut"));
+    let json = study(&case, &whole, &["--threads", "1"]).done().json();
+    for row in json["rows"].as_array().unwrap() {
+        let (passed, error) = (number(row, "grains_passed"), number(row, "grains_passed_error"));
+        // (1 - 0.4)² of the cell is open; the interval of 95 %, a little widened.
+        assert!((number(row, "open_fraction") - 0.36).abs() < 1e-12);
+        assert!((passed - 0.36).abs() < 1.5 * error, "{passed} ± {error} passed");
+        assert!((passed + number(row, "grains_caught") - 1.0).abs() < 1e-12, "none turns back");
+    }
+    // Killed with two rows of three, the second as a kill while it is written would leave it: its strikes are kept, the row is not.
+    let journal = killed_with(2, &scratch, &case, &cut);
+    let text = fs::read(&journal).unwrap();
+    fs::write(&journal, &text[..text.len() - 30]).unwrap();
+    let json = study(&case, &cut, &["--threads", "2"]).done().json();
+    assert_eq!(json["rows_kept"].as_u64(), Some(1));
+    for name in ["study.csv", "study.parquet", "front.svg", "strikes.csv", "strikes.svg"] {
+        assert_eq!(file(&whole, name), file(&cut, name), "{name}");
+    }
 }
 
 /// Parallel wires, 7 x 7 pitches, half way between two plates; no grains.
