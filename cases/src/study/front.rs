@@ -145,11 +145,11 @@ impl Front {
             shape,
         };
         let knee = self.knee.and_then(|knee| if let Knee::At(grid) = knee { Some(grid) } else { None });
-        let marks = vec![
+        let mut marks = vec![
             mark("surpassed by none", self.front.clone(), Shape::Circle),
-            mark("knee", knee.into_iter().collect(), Shape::Triangle),
             mark("best by weight", vec![self.optimum], Shape::Cross),
         ];
+        marks.extend(knee.map(|knee| mark("knee", vec![knee], Shape::Triangle)));
         let budget = (100.0 * self.tolerated).log10();
         let ends = || self.grids.iter().map(|grid| 100.0 * grid.light);
         let line = [ends().fold(f64::INFINITY, f64::min), ends().fold(f64::NEG_INFINITY, f64::max)];
