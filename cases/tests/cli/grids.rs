@@ -141,14 +141,14 @@ spacing  = 0.5
 accuracy = 0.5
 
 [[grains]]
-count  = 60
+count  = 30
 mass   = "1 kg"
 charge = "1e-30 C"
 place  = { kind = "box", min = [-1, -1, 0.6], max = [1, 1, 0.7] }
 speed  = { kind = "uniform", velocity = [0, 0, -1] }
 
 [trace]
-duration = 1.5
+duration = 1.2
 
 [study]
 kind   = "grid_transparency"
@@ -158,7 +158,7 @@ lines  = 1
 rays   = 100
 
 [sweep]
-"grains.1.count" = [60, 70, 80]
+"grains.1.count" = [30, 35, 40]
 "#;
     let case = scratch.file("crossed.toml", text);
     let (whole, cut) = (scratch.at("whole"), scratch.at("cut"));
