@@ -16,6 +16,7 @@ pub fn open_fraction(pitch: f64, pattern: &GridPattern) -> f64 {
                 // On the lattice of the honeycomb the cell is a hexagon of width `pitch`.
                 Hole::Square | Hole::Hexagonal => ratio * ratio,
                 Hole::Round => FRAC_PI_4 * ratio * ratio,
+                Hole::Slot => ratio,
             }
         }
         GridPattern::Wires { weave, wire_radius } => {
@@ -139,6 +140,8 @@ mod tests {
             plate(Hole::Round, 0.7, 0.0),
             plate(Hole::Hexagonal, 0.7, 0.0),
             plate(Hole::Square, 0.7, 0.3),
+            plate(Hole::Slot, 0.7, 0.0),
+            plate(Hole::Slot, 0.7, 0.3),
             wires(Weave::Parallel, 0.1),
             wires(Weave::Crossed, 0.1),
             wires(Weave::Woven, 0.1),
@@ -158,6 +161,10 @@ mod tests {
         let exact = a * a - 4.0 / PI * a * h + h * h / PI;
         let seen = light(&plate(Hole::Square, a, t), Incidence::Angle(angle));
         assert!((seen - exact).abs() < 3e-3, "{seen} instead of {exact}");
+
+        // Through slots only the direction across them counts: a - t tan θ |cos φ|, on average over φ a - 2 h / π.
+        let seen = light(&plate(Hole::Slot, a, t), Incidence::Angle(angle));
+        assert!((seen - (a - 2.0 * h / PI)).abs() < 3e-3, "{seen} through slots");
 
         // Wires along y seen at θ from x: the shadow of a cylinder is 2r / cos(angle to its normal plane), on average over φ.
         let (r, angle) = (0.1, PI / 6.0);

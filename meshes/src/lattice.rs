@@ -9,12 +9,13 @@ pub fn holes_along(side: f64, pitch: f64) -> usize {
 
 /// Centres of the holes in a plate about the origin, m.
 ///
-/// On a rectangle, square and round holes fill as many whole pitches as fit, centred. In every other case a hole is kept
+/// On a rectangle, square and round holes fill as many whole pitches as fit, centred, and so do slots. In every other case a hole is kept
 /// when its cell (the square or hexagon that belongs to it) leaves a whole rim of a tenth of a pitch: on a disc the lattice
-/// has a hole on the axis; hexagons stand in rows along `e1`.
+/// has a hole on the axis; hexagons stand in rows along `e1`. Slots are kept where a square hole beside the middle would be.
 pub fn hole_lattice(outline: Outline, pitch: f64, hole: Hole) -> Vec<[f64; 2]> {
-    if let (Outline::Rectangle([a, b]), Hole::Square | Hole::Round) = (outline, hole) {
+    if let (Outline::Rectangle([a, b]), Hole::Square | Hole::Round | Hole::Slot) = (outline, hole) {
         let (n, m) = (holes_along(a, pitch), holes_along(b, pitch));
+        let m = if hole == Hole::Slot { m.min(1) } else { m };
         let at = |k: usize, n: usize| (k as f64 - 0.5 * (n as f64 - 1.0)) * pitch;
         return (0..n).flat_map(|i| (0..m).map(move |j| [at(i, n), at(j, m)])).collect();
     }
@@ -44,6 +45,7 @@ pub fn hole_lattice(outline: Outline, pitch: f64, hole: Hole) -> Vec<[f64; 2]> {
         })
     };
     let (rows, columns) = ((reach_y / row_step) as i64 + 1, (reach_x / pitch) as i64 + 1);
+    let rows = if hole == Hole::Slot { 0 } else { rows };
     let mut centers = Vec::new();
     for j in -rows..=rows {
         let shift = if hexagonal && j % 2 != 0 { 0.5 * pitch } else { 0.0 };
@@ -55,6 +57,32 @@ pub fn hole_lattice(outline: Outline, pitch: f64, hole: Hole) -> Vec<[f64; 2]> {
         }
     }
     centers
+}
+
+/// Half the length of the slot at `x` of [`hole_lattice`], m: what is left of the plate by half a bar at its end, and on a disc by the
+/// rim that all cells leave.
+pub fn slot_half_length(outline: Outline, pitch: f64, open: f64, x: f64) -> f64 {
+    let end = match outline {
+        Outline::Rectangle([_, b]) => 0.5 * b,
+        Outline::Disc(radius) => ((radius - 0.1 * pitch).powi(2) - (x.abs() + 0.5 * pitch).powi(2)).max(0.0).sqrt(),
+    };
+    end - 0.5 * (pitch - open)
+}
+
+/// Where square holes or slots of a rectangle begin and end along `e1` and along `e2`, m; a hole is where both have one.
+pub fn hole_spans(size: [f64; 2], pitch: f64, hole: Hole, open: f64) -> [Vec<[f64; 2]>; 2] {
+    let row = |side: f64| -> Vec<[f64; 2]> {
+        let n = holes_along(side, pitch);
+        let center = |k: usize| (k as f64 - 0.5 * (n as f64 - 1.0)) * pitch;
+        (0..n).map(|k| [center(k) - 0.5 * open, center(k) + 0.5 * open]).collect()
+    };
+    let along = if hole == Hole::Slot {
+        let half = slot_half_length(Outline::Rectangle(size), pitch, open, 0.0);
+        vec![[-half, half]]
+    } else {
+        row(size[1])
+    };
+    [row(size[0]), along]
 }
 
 /// Wires of one layer of a wire grid: offset across and half length of each, m. `second`: the layer along `e2`.
@@ -109,6 +137,22 @@ mod tests {
                 d.fold(f64::INFINITY, f64::min)
             };
             assert!(centers.iter().all(|p| (nearest(p) - 0.13).abs() < 1e-12));
+        }
+    }
+
+    #[test]
+    fn slots_leave_half_a_bar_at_their_ends() {
+        let plate = Outline::Rectangle([1.0, 0.7]);
+        assert_eq!(hole_lattice(plate, 0.25, Hole::Slot), [[-0.375, 0.0], [-0.125, 0.0], [0.125, 0.0], [0.375, 0.0]]);
+        let [across, along] = hole_spans([1.0, 0.7], 0.25, Hole::Slot, 0.2);
+        assert!(across.iter().all(|[from, to]| (to - from - 0.2).abs() < 1e-15) && across.len() == 4);
+        assert!(along.len() == 1 && (along[0][1] - 0.325).abs() < 1e-15 && along[0][0] == -along[0][1]);
+        // On a disc none is shorter than wide, and all end within the rim.
+        let slots = hole_lattice(Outline::Disc(1.0), 0.13, Hole::Slot);
+        assert_eq!(slots.len(), 15);
+        for [x, y] in slots {
+            let half = slot_half_length(Outline::Disc(1.0), 0.13, 0.1, x);
+            assert!(y == 0.0 && half >= 0.05 && (x.abs() + 0.065).hypot(half + 0.015) < 0.987 + 1e-12, "{x} {half}");
         }
     }
 

@@ -49,6 +49,8 @@ pub enum Hole {
     Round,
     /// Regular hexagons on a triangular lattice (a honeycomb); the pitch is the distance of neighbouring centres.
     Hexagonal,
+    /// Slots along `e2`, side by side along `e1`, as long as the plate but for a rim of half a bar: flat bars in a frame.
+    Slot,
 }
 
 /// How the wires of a wire grid lie.

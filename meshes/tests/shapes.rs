@@ -146,6 +146,29 @@ fn shapes() -> Vec<(&'static str, Known)> {
             ),
         ),
         (
+            "slots",
+            sheet(
+                perforated(Outline::Rectangle([1.0, 0.85]), Hole::Slot, 0.15, 0.0),
+                0.85 - 5.0 * 0.15 * 0.8,
+                3.7 + 10.0 * 0.95,
+            ),
+        ),
+        (
+            "thick slots with border",
+            closed(
+                perforated(Outline::Rectangle([1.1, 0.85]), Hole::Slot, 0.15, 0.03),
+                2.0 * (1.1 * 0.85 - 5.0 * 0.15 * 0.8) + (3.9 + 10.0 * 0.95) * 0.03,
+                (1.1 * 0.85 - 5.0 * 0.15 * 0.8) * 0.03,
+            ),
+        ),
+        ("thick slots in a disc", {
+            let slots = meshes::lattice::hole_lattice(Outline::Disc(0.7), 0.2, Hole::Slot);
+            let long = |x: f64| 2.0 * meshes::lattice::slot_half_length(Outline::Disc(0.7), 0.2, 0.15, x);
+            let length: f64 = slots.iter().map(|[x, _]| long(*x)).sum();
+            let (face, walls) = (PI * 0.49 - 0.15 * length, TAU * 0.7 + 2.0 * length + 0.3 * slots.len() as f64);
+            closed(perforated(Outline::Disc(0.7), Hole::Slot, 0.15, 0.05), 2.0 * face + 0.05 * walls, face * 0.05)
+        }),
+        (
             "round holes",
             sheet(
                 perforated(Outline::Rectangle([1.0, 0.85]), Hole::Round, 0.15, 0.0),

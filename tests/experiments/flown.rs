@@ -42,7 +42,8 @@ pub fn flown(name: &str, sets: &[&str]) -> Flown {
         let surface = obstacles(mesh, case.field.ground.as_ref(), &region);
         let settings = case.trace.as_ref().expect("an experiment is traced");
         let field = driven.field.clone();
-        let flights = fly(&case, settings, &source, field, None, surface, &ready.ensemble, region, None, &reporter)?;
+        let flights =
+            fly(&case, settings, &source, field, None, surface, &ready.ensemble, region, true, None, &reporter)?;
         Ok((driven, flights))
     };
     let (driven, flights) = fly_it().unwrap_or_else(|e| panic!("{name}: {e:?}"));

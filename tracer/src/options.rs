@@ -58,6 +58,9 @@ pub struct Options {
     pub max_step: Option<f64>,
     /// Interval between samples, s. Default: no samples.
     pub every: Option<f64>,
+    /// Samples hold forces and energies; without, only the first of a grain does, and the others have zeros. Default: yes. Where the
+    /// field has no table they take longer than the flight.
+    pub forces: bool,
     /// Names the random numbers of the noise. Default: 1.
     pub seed: u64,
     /// Grains traced side by side by one thread. Changes no result. Default: 64, whose stages (60 kB) stay in a core's
@@ -85,6 +88,7 @@ impl Default for Options {
             step: None,
             max_step: None,
             every: None,
+            forces: true,
             seed: 1,
             block: 64,
             estimate_error: true,
@@ -106,6 +110,7 @@ impl fmt::Debug for Options {
             .field("step", &self.step)
             .field("max_step", &self.max_step)
             .field("every", &self.every)
+            .field("forces", &self.forces)
             .field("seed", &self.seed)
             .field("block", &self.block)
             .field("estimate_error", &self.estimate_error)

@@ -416,6 +416,16 @@ fn law_observers_see_every_sample_once_and_in_order() {
     }
     let expected: usize = traced.endings.iter().map(|e| (e.time / 0.1 - 1e-9).ceil() as usize + 1).sum();
     assert_eq!(seen.into_inner(), expected);
+    // Where nobody asks for forces, grains fly and are sampled as before, and only their first samples have some.
+    let (with, ends) = samples(&system, &grains, &options);
+    let (without, same_ends) = samples(&system, &grains, &Options { forces: false, ..options.clone() });
+    assert_eq!(ends, same_ends);
+    for (with, without) in with.iter().zip(&without) {
+        assert_eq!(with.first(), without.first());
+        assert!(with.len() < 3 || with[1].force != Vec3::zeros());
+        let bare = |s: &tracer::Sample| tracer::Sample { force: Vec3::zeros(), potential_energy: 0.0, ..*s };
+        assert!(with.iter().skip(1).map(bare).eq(without.iter().skip(1).copied()));
+    }
 }
 
 #[test]

@@ -384,8 +384,10 @@
   const place = (number, { text, className, at }) => {
     const p = at.clone().project(camera), of = span(number, className, text);
     if (p.z > 1 || Math.abs(p.x) > 1.05 || Math.abs(p.y) > 1.05) { of.hidden = true; return; }
-    const x = (0.5 + 0.5 * p.x) * stage.clientWidth, y = (0.5 - 0.5 * p.y) * stage.clientHeight;
-    of.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(${className === "mark" ? "6px, -50%" : "-50%, -50%"})`;
+    // In parts of the view, which is of another size on paper.
+    of.style.left = `${(50 + 50 * p.x).toFixed(2)}%`;
+    of.style.top = `${(50 - 50 * p.y).toFixed(2)}%`;
+    of.style.transform = `translate(${className === "mark" ? "6px, -50%" : "-50%, -50%"})`;
   };
 
   // ---- Nulls as little crosses.
@@ -514,6 +516,7 @@
     renderer.setSize(stage.clientWidth, stage.clientHeight, false);
     uniforms.ratio.value = ratio;
     camera.aspect = stage.clientWidth / Math.max(1, stage.clientHeight);
+    stage.style.setProperty("--aspect", camera.aspect.toFixed(4));
     camera.updateProjectionMatrix();
     draw();
   };

@@ -123,6 +123,7 @@ enum HoleStored {
     Square,
     Round,
     Hexagonal,
+    Slot,
 }
 
 #[derive(Serialize)]

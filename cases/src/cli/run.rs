@@ -41,8 +41,19 @@ pub(super) fn run(session: &Session, resume: bool, trace: bool) -> Result<(), Fa
         let journal = Checkpoint::new(&session.folder, case, every, left.as_ref(), out.early("cache"))?;
         let kept = Some(Kept { journal: Arc::new(journal), standing: left.map(|left| Arc::new(left.standing)) });
         let induction = induction(case, source, &ready.electrodes, &*reporter)?;
-        let flights =
-            fly(case, settings, source, driven.field, induction, surface, &ready.ensemble, region, kept, &reporter)?;
+        let flights = fly(
+            case,
+            settings,
+            source,
+            driven.field,
+            induction,
+            surface,
+            &ready.ensemble,
+            region,
+            true,
+            kept,
+            &reporter,
+        )?;
         session.progress.stage("write");
         let start = Instant::now();
         tracks::write(&mut out, &flights, &ready.ensemble)?;

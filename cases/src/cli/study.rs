@@ -168,7 +168,7 @@ fn finish(
         StudyKind::Sweep | StudyKind::Optimise => None,
     };
     if let Some(front) = &front {
-        pictures::write(&mut out, "front", &front.figure(&session.title(), sweep, rows))?;
+        pictures::write(&mut out, "front", &front.figure(&session.title()))?;
     }
     let struck = struck(session, rows);
     if !struck.is_empty() {

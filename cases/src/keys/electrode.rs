@@ -89,7 +89,7 @@ pub(crate) enum ShapeKeys {
         pitch: Positive<Length>,
         /// Form of the holes.
         hole: Option<HoleName>,
-        /// Width across flats, or diameter, of a hole.
+        /// Width across flats, or diameter, of a hole; width of a slot.
         open: Option<Positive<Length>>,
         /// Thickness of a perforated plate; left out: a sheet.
         thickness: Option<NonNegative<Length>>,
@@ -168,6 +168,8 @@ pub(crate) enum HoleName {
     Round,
     /// Hexagons on a triangular lattice.
     Hexagonal,
+    /// Slots along `up`: flat bars in a frame.
+    Slot,
 }
 
 /// How the wires of a grid plate lie.

@@ -10,6 +10,10 @@ use super::value::{Count, DirectionKeys, Fraction, Number, Vector, Whole};
 use crate::quantity::kinds::{Angle, Length};
 use crate::quantity::{NonNegative, Positive, Range};
 
+/// Keys of `[study]` that only an optimisation has.
+pub(crate) const OF_OPTIMISATION: [&str; 10] =
+    ["objective", "goal", "constraints", "vary", "tie", "evaluations", "tolerance", "optimiser", "starts", "seed"];
+
 /// `[study]`
 #[derive(Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

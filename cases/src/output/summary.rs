@@ -534,7 +534,8 @@ fn capacitances(case: &Case, solve: &SolveSummary) -> Vec<String> {
 
 /// A length for people.
 pub fn metres(length: f64) -> String {
-    let (factor, unit) = match length.abs() {
+    // A tenth of a millimetre to rounding is one.
+    let (factor, unit) = match length.abs() * (1.0 + 1e-9) {
         l if l == 0.0 || l >= 0.1 => (1.0, "m"),
         l if l >= 1e-4 => (1e-3, "mm"),
         l if l >= 1e-7 => (1e-6, "um"),

@@ -278,7 +278,7 @@ pub fn obstacles(mesh: &SurfaceMesh, ground: Option<&Plane>, region: &Region) ->
     Some(Arc::new(SurfaceTree::new(&mesh)))
 }
 
-/// Traces the grains of a case.
+/// Traces the grains of a case. `forces`: samples hold forces and energies, too.
 ///
 /// # Errors
 /// An integrator that cannot do what the forces ask, a tolerance that cannot be reached.
@@ -292,6 +292,7 @@ pub fn fly(
     surface: Option<Arc<SurfaceTree>>,
     ensemble: &Ensemble,
     region: Region,
+    forces: bool,
     kept: Option<Kept>,
     reporter: &Arc<dyn Reporter>,
 ) -> Result<Flights, Failure> {
@@ -325,6 +326,7 @@ pub fn fly(
         tolerance: (STEP_SHARE * settings.accuracy).clamp(1e-13, 1e-3),
         step: settings.step,
         every: Some(every),
+        forces,
         seed: settings.seed,
         journal,
         resume: standing,

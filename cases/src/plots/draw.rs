@@ -61,6 +61,11 @@ fn pale(index: usize) -> String {
     format!("#{:02x}{:02x}{:02x}", mixed[0], mixed[1], mixed[2])
 }
 
+/// What a curve is drawn with, and its sample in the legend.
+pub(super) fn stroke(index: usize, faint: bool) -> String {
+    if faint { pale(index) } else { colour(index).to_owned() }
+}
+
 /// Width of a line of text, pixels: the widths of DejaVu Sans in four classes, a few per cent wide of the truth.
 pub(super) fn text_width(text: &str, size: u32) -> f64 {
     let em = |c: char| match c {
@@ -338,7 +343,7 @@ fn draw_panel(scene: &mut Scene, panel: &Panel, y: Axis, place: &Place, budget: 
 fn plots(panel: &Panel, x: Axis, y: Axis, inner: [f64; 2], budget: usize) -> Vec<Plot> {
     let mut plots = Vec::new();
     for (curve, points) in panel.curves.iter().zip(thinned(panel, x, y, inner, budget)) {
-        let stroke = if curve.faint { pale(curve.colour) } else { colour(curve.colour).to_owned() };
+        let stroke = stroke(curve.colour, curve.faint);
         let width = if curve.faint { 1.0 } else { 2.0 };
         for run in points.split(|point| !drawable(point)) {
             match run {

@@ -3,7 +3,7 @@
 use kuva::render::color::Color;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
 
-use super::draw::{GROUND, INK, colour, mark_shape, shortened, text, text_width};
+use super::draw::{GROUND, INK, mark_shape, shortened, stroke, text, text_width};
 use super::{Panel, Shape};
 
 const SIZE: u32 = 15;
@@ -14,7 +14,7 @@ const GAP: f64 = 26.0;
 /// What stands before a label.
 #[derive(Clone, Copy)]
 enum Sample {
-    Line(usize),
+    Line(usize, bool),
     Mark(Shape),
     Ground,
 }
@@ -35,7 +35,7 @@ impl Legend {
             }
         };
         for panel in panels {
-            panel.curves.iter().for_each(|curve| enter(Sample::Line(curve.colour), &curve.label));
+            panel.curves.iter().for_each(|curve| enter(Sample::Line(curve.colour, curve.faint), &curve.label));
         }
         for panel in panels {
             panel.marks.iter().for_each(|mark| enter(Sample::Mark(mark.shape), &mark.label));
@@ -70,12 +70,12 @@ impl Legend {
             let mut x = middle - 0.5 * total;
             for (sample, label) in row {
                 match sample {
-                    Sample::Line(index) => scene.add(Primitive::Line {
+                    Sample::Line(index, faint) => scene.add(Primitive::Line {
                         x1: x,
                         y1: y,
                         x2: x + SAMPLE - 8.0,
                         y2: y,
-                        stroke: Color::from(colour(*index)),
+                        stroke: Color::from(stroke(*index, *faint).as_str()),
                         stroke_width: 3.0,
                         stroke_dasharray: None,
                     }),

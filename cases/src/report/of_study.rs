@@ -7,18 +7,43 @@ use super::table::{Key, Section, Table};
 
 /// Rows that are shown; all are in `study.csv`.
 const ROWS: usize = 2000;
+/// Numbers of the best point that stand above everything.
+const MOST_BEST: usize = 4;
 /// Keys that have their place on the page.
 const KNOWN: [&str; 8] = ["version", "command", "title", "points", "failed", "threads", "seconds", "peak_memory_bytes"];
 
 /// What people look for first.
 pub fn keys(study: &Value) -> Vec<Key> {
-    let mut keys = Vec::new();
+    let mut keys = best(study);
     for (key, name) in [("points", "points"), ("failed", "of which failed"), ("solved", "fields solved")] {
         if let Some(count) = study[key].as_u64() {
             keys.push(Key { name: name.to_owned(), cell: Cell::count(count) });
         }
     }
     keys
+}
+
+/// What an optimisation found: the objective, and where.
+fn best(study: &Value) -> Vec<Key> {
+    let row = &study["best"];
+    let columns = study["columns"].as_array().map(Vec::as_slice).unwrap_or_default();
+    // Between the number of the point and its status stands what was varied.
+    let varied = columns.iter().skip(1).map_while(|column| column["name"].as_str().filter(|name| *name != "status"));
+    let broken = row["violation"].as_f64().is_some_and(|violation| violation > 0.0);
+    let objective = study["objective"].as_str().unwrap_or("objective");
+    let title = if broken { format!("{objective}, with constraints broken") } else { format!("best {objective}") };
+    let told = |(column, name): (&str, String)| {
+        let unit = columns.iter().find(|known| known["name"] == column).and_then(|known| known["unit"].as_str());
+        let cell = match &row[column] {
+            Value::String(text) => Cell::words(text),
+            value => {
+                number(value.as_f64()?, row[&format!("{column}_error")].as_f64(), unit.unwrap_or_default()).short()
+            }
+        };
+        Some(Key { name, cell })
+    };
+    let all = [("objective", title)].into_iter().chain(varied.map(|name| (name, name.to_owned())));
+    all.filter_map(told).take(MOST_BEST).collect()
 }
 
 /// All tables.

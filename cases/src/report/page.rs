@@ -117,6 +117,8 @@ impl Picture {
             "stability_chart" => "Stability",
             "front" => "Grids that none surpasses",
             "study" => "Numbers over what was varied",
+            "history" => "The objective, evaluation after evaluation",
+            "strikes" => "Where grains strike the cell of the grid",
             _ => "",
         };
         let data = format!("data:image/svg+xml;base64,{}", STANDARD.encode(svg));

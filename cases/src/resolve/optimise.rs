@@ -4,7 +4,7 @@ use super::at::At;
 use super::sweep::{end, varies};
 use crate::case::{Asked, Case, Constraint, Optimise, StudyKind, Tie, Varied};
 use crate::error::CaseError;
-use crate::keys::study::{StudyKeys, VaryKeys};
+use crate::keys::study::{OF_OPTIMISATION, StudyKeys, VaryKeys};
 use crate::keys::sweep::Scale;
 use crate::study::expression::Expression;
 use crate::study::names::{From, asked, listed, names, origin};
@@ -16,19 +16,7 @@ const MOST_EVALUATIONS: usize = 100_000;
 /// What is optimised, if anything is, and the numbers that the study takes.
 pub(super) fn optimise(at: &At, keys: &StudyKeys, case: &Case) -> Result<(Option<Optimise>, Asked), CaseError> {
     if case.study.kind != StudyKind::Optimise {
-        let only = [
-            "objective",
-            "goal",
-            "constraints",
-            "vary",
-            "tie",
-            "evaluations",
-            "tolerance",
-            "optimiser",
-            "starts",
-            "seed",
-        ];
-        if let Some(key) = only.iter().find(|key| at.key(key).written()) {
+        if let Some(key) = OF_OPTIMISATION.iter().find(|key| at.key(key).written()) {
             let help = "write kind = \"optimise\" in [study], or leave this out";
             return Err(at.key(key).key_error("only an optimisation has this key", help));
         }

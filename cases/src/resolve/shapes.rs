@@ -188,6 +188,7 @@ fn grid_plate(at: &At, keys: &ShapeKeys) -> Result<Shape, CaseError> {
                 HoleName::Square => Hole::Square,
                 HoleName::Round => Hole::Round,
                 HoleName::Hexagonal => Hole::Hexagonal,
+                HoleName::Slot => Hole::Slot,
             };
             GridPattern::Perforated { hole, open: open.value, thickness: or_zero(thickness) }
         }

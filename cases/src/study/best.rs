@@ -9,24 +9,10 @@ use super::points::{case_at, edits};
 use crate::CaseSource;
 use crate::case::{Case, Optimise};
 use crate::key_path::split;
+use crate::keys::study::OF_OPTIMISATION;
 
 /// Name of the file.
 pub const BEST: &str = "best.toml";
-
-/// Keys of `[study]` that make it an optimisation.
-const OF_OPTIMISATION: [&str; 11] = [
-    "kind",
-    "objective",
-    "goal",
-    "constraints",
-    "vary",
-    "tie",
-    "evaluations",
-    "tolerance",
-    "optimiser",
-    "starts",
-    "seed",
-];
 
 /// The text of the case at some values of what is varied, with a comment before it. It is the same case, but for the study.
 ///
@@ -41,6 +27,7 @@ pub fn best(
 ) -> Result<String, String> {
     let mut document: DocumentMut = source.text.parse().map_err(|error| format!("{error}"))?;
     if let Some(study) = document.get_mut("study").and_then(Item::as_table_like_mut) {
+        study.remove("kind");
         for key in OF_OPTIMISATION {
             study.remove(key);
         }

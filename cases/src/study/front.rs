@@ -16,6 +16,24 @@ struct Grid {
     light: f64,
     /// Largest deviation of the field, against the strongest.
     deviation: f64,
+    /// Width of a wire, or of a bar between holes, m.
+    wire: f64,
+}
+
+impl Grid {
+    /// Of the same wire, to rounding.
+    fn same_wire(&self, other: &Self) -> bool {
+        (self.wire - other.wire).abs() <= 1e-9 * self.wire
+    }
+}
+
+/// Where a front bends most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Knee {
+    /// At this grid, with grids of the same wire on both sides.
+    At(usize),
+    /// At this grid, where those of its wire end: what is beyond has not been looked at.
+    End(usize),
 }
 
 /// The grids that no other surpasses in both light and field.
@@ -25,8 +43,8 @@ pub struct Front {
     grids: Vec<Grid>,
     /// Places in `grids`, from dark to bright.
     front: Vec<usize>,
-    /// The last from which more light costs little.
-    knee: usize,
+    /// Where the front bends towards the better, if it does.
+    knee: Option<Knee>,
     /// The best of the user's own weighting.
     optimum: usize,
     /// The name of the number that tells the transparency.
@@ -42,15 +60,16 @@ impl Front {
             if rows.iter().any(|row| row.value("light.cone").is_some()) { "light.cone" } else { "open_fraction" };
         let grid = |(n, row): (usize, &Row)| {
             // A wire as narrow as can be made, to rounding.
-            let makeable = row.value("wire")? >= weighing.smallest_wire * (1.0 - 1e-9);
+            let wire = row.value("wire")?;
+            let makeable = wire >= weighing.smallest_wire * (1.0 - 1e-9);
             let (light, deviation) = (row.value(light)?, row.value("field_deviation_max")?);
-            makeable.then_some(Grid { row: n, light, deviation })
+            makeable.then_some(Grid { row: n, light, deviation, wire })
         };
         let grids: Vec<Grid> = rows.iter().enumerate().filter_map(grid).collect();
         let front = front(&grids);
         let cost = |grid: &Grid| weighing.weight * (1.0 - grid.light) + grid.deviation / weighing.tolerated;
         let optimum = (0..grids.len()).min_by(|a, b| cost(&grids[*a]).total_cmp(&cost(&grids[*b])))?;
-        let knee = knee(&grids, &front)?;
+        let knee = knee(&grids, &front);
         Some(Self { front, knee, optimum, grids, light, tolerated: weighing.tolerated })
     }
 
@@ -60,7 +79,7 @@ impl Front {
         json!({
             "transparency": self.light,
             "front": self.front.iter().map(|grid| point(*grid)).collect::<Vec<_>>(),
-            "knee": point(self.knee),
+            "knee": self.knee.and_then(|knee| if let Knee::At(grid) = knee { Some(point(grid)) } else { None }),
             "optimum": point(self.optimum),
         })
     }
@@ -89,30 +108,35 @@ impl Front {
             None => format!("none is within {:.2} % of the field", 100.0 * self.tolerated),
         };
         format!(
-            "of {} grids {} are surpassed by none in both light and field; the knee: {}; {budget}; the best by the study's weights: {}",
+            "of {} grids {} are surpassed by none in both light and field; {}; {budget}; the best by the study's weights: {}",
             self.grids.len(),
             self.front.len(),
-            told(self.knee),
+            match self.knee {
+                Some(Knee::At(grid)) => format!("the knee: {}", told(grid)),
+                Some(Knee::End(grid)) => format!(
+                    "there is no knee: they bend most at point {}, the last of its wire that was looked at",
+                    rows[self.grids[grid].row].point + 1
+                ),
+                None => "there is no knee between the ends of these".to_owned(),
+            },
             told(self.optimum)
         )
     }
 
     /// Deviation over light, a curve for each wire.
-    pub fn figure(&self, title: &str, _: &Sweep, rows: &[Row]) -> Figure {
+    pub fn figure(&self, title: &str) -> Figure {
         let at = |n: &usize| [100.0 * self.grids[*n].light, (100.0 * self.grids[*n].deviation).log10()];
-        let wire = |n: usize| rows[self.grids[n].row].value("wire").unwrap_or(0.0);
-        let mut wires: Vec<f64> = (0..self.grids.len()).map(wire).collect();
-        wires.sort_by(f64::total_cmp);
-        wires.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * b.abs());
+        let mut wires = self.grids.clone();
+        wires.sort_by(|a, b| a.wire.total_cmp(&b.wire));
+        wires.dedup_by(|a, b| b.same_wire(a));
         let mut curves = Vec::new();
         // Wires that are all different, as where holes shrink in one plate, make one curve.
         if wires.len() <= MOST_CURVES {
-            for (colour, width) in wires.iter().enumerate() {
-                let mut of: Vec<usize> =
-                    (0..self.grids.len()).filter(|n| (wire(*n) - width).abs() <= 1e-9 * width).collect();
+            for (colour, first) in wires.iter().enumerate() {
+                let mut of: Vec<usize> = (0..self.grids.len()).filter(|n| first.same_wire(&self.grids[*n])).collect();
                 of.sort_by(|a, b| self.grids[*a].light.total_cmp(&self.grids[*b].light));
                 let points = of.iter().map(at).collect();
-                curves.push(Curve { label: format!("wire {}", metres(*width)), points, colour, faint: false });
+                curves.push(Curve { label: format!("wire {}", metres(first.wire)), points, colour, faint: false });
             }
         }
         let mark = |label: &str, of: Vec<usize>, shape: Shape| Mark {
@@ -120,11 +144,12 @@ impl Front {
             points: of.iter().map(at).collect(),
             shape,
         };
-        let marks = vec![
+        let knee = self.knee.and_then(|knee| if let Knee::At(grid) = knee { Some(grid) } else { None });
+        let mut marks = vec![
             mark("surpassed by none", self.front.clone(), Shape::Circle),
-            mark("knee", vec![self.knee], Shape::Triangle),
             mark("best by weight", vec![self.optimum], Shape::Cross),
         ];
+        marks.extend(knee.map(|knee| mark("knee", vec![knee], Shape::Triangle)));
         let budget = (100.0 * self.tolerated).log10();
         let ends = || self.grids.iter().map(|grid| 100.0 * grid.light);
         let line = [ends().fold(f64::INFINITY, f64::min), ends().fold(f64::NEG_INFINITY, f64::max)];
@@ -150,6 +175,9 @@ impl Front {
 /// Curves in one panel: colours but the one of the budget.
 const MOST_CURVES: usize = 6;
 
+/// What is on the line between the ends but for rounding is not below it, in units of the front's extent.
+const ROUNDING: f64 = 1e-9;
+
 /// The grids that none surpasses, from dark to bright.
 fn front(grids: &[Grid]) -> Vec<usize> {
     let surpasses = |a: &Grid, b: &Grid| {
@@ -162,10 +190,11 @@ fn front(grids: &[Grid]) -> Vec<usize> {
 }
 
 /// The grid of the front furthest below the line between its ends, light against the logarithm of the deviation, both in units of
-/// the front's extent.
+/// the front's extent; `None` where none is below it: an end of the front is no knee. Nor is the end of a part of it that is of one wire:
+/// there the front bends because nobody has looked further.
 ///
 /// Source: Das 1999, the normal-boundary characterisation of the knee. Checked by `the_front_and_its_knee`.
-fn knee(grids: &[Grid], front: &[usize]) -> Option<usize> {
+fn knee(grids: &[Grid], front: &[usize]) -> Option<Knee> {
     let (first, last) = (&grids[*front.first()?], &grids[*front.last()?]);
     let height = |grid: &Grid| grid.deviation.max(1e-15).ln();
     let (width, rise) = (last.light - first.light, height(last) - height(first));
@@ -173,7 +202,13 @@ fn knee(grids: &[Grid], front: &[usize]) -> Option<usize> {
         let part = |x: f64, whole: f64| if whole > 0.0 { x / whole } else { 0.0 };
         part(grids[*n].light - first.light, width) - part(height(&grids[*n]) - height(first), rise)
     };
-    front.iter().copied().max_by(|a, b| below(a).total_cmp(&below(b)))
+    let lowest = front.iter().copied().max_by(|a, b| below(a).total_cmp(&below(b)))?;
+    let (grid, brighter) = (&grids[lowest], |other: &&Grid| other.light > grids[lowest].light);
+    let mut wire = grids.iter().filter(|other| grid.same_wire(other) && other.light != grid.light);
+    let alone = wire.clone().next().is_none();
+    let between = wire.clone().any(|other| brighter(&other)) && wire.any(|other| !brighter(&other));
+    let knee = if alone || between { Knee::At(lowest) } else { Knee::End(lowest) };
+    (below(&lowest) > ROUNDING).then_some(knee)
 }
 
 #[cfg(test)]
@@ -182,13 +217,29 @@ mod tests {
 
     #[test]
     fn the_front_and_its_knee() {
-        let grid = |(row, (light, deviation)): (usize, (f64, f64))| Grid { row, light, deviation };
+        let grid = |(row, (light, deviation)): (usize, (f64, f64))| Grid { row, light, deviation, wire: 1e-4 };
         // Three on a front with a bend at 0.8, one equal to none of them but worse, one brighter and as far off as the last.
         let points = [(0.5, 1e-3), (0.8, 2e-3), (0.95, 1e-1), (0.7, 3e-3), (0.96, 1e-1)];
         let grids: Vec<Grid> = points.into_iter().enumerate().map(grid).collect();
         let found = front(&grids);
         assert_eq!(found, [0, 1, 4]);
-        assert_eq!(knee(&grids, &found), Some(1));
-        assert_eq!(knee(&grids[..1], &front(&grids[..1])), Some(0));
+        assert_eq!(knee(&grids, &found), Some(Knee::At(1)));
+        // The same bend where grids of one wire end and those of another go on.
+        let mut two = grids.clone();
+        two[0].wire = 2e-4;
+        two[3].wire = 2e-4;
+        assert_eq!(knee(&two, &front(&two)), Some(Knee::End(1)));
+        // Wires that are all different make one curve.
+        let mut each = grids.clone();
+        each.iter_mut().for_each(|grid| grid.wire *= 1.0 + grid.light);
+        assert_eq!(knee(&each, &found), Some(Knee::At(1)));
+        // One alone, two, and three that bend the other way have none.
+        let none = |points: &[(f64, f64)]| {
+            let grids: Vec<Grid> = points.iter().copied().enumerate().map(grid).collect();
+            assert_eq!(knee(&grids, &front(&grids)), None, "{points:?}");
+        };
+        none(&points[..1]);
+        none(&points[..2]);
+        none(&[(0.5, 1e-3), (0.6, 5e-2), (0.95, 1e-1)]);
     }
 }

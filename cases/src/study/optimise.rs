@@ -10,7 +10,7 @@ use super::journal::usable;
 use super::points::{Point, case_at, key, value_in_si};
 use super::row::{End, Number, Row};
 use super::sampling::unit_samples;
-use super::search::{Judged, Landscape, Settings, search};
+use super::search::{Judged, Landscape, Settings, search, settle};
 use super::work::{Tally, Work};
 use crate::cache::solution_key;
 use crate::case::{Goal, Optimise, Sampling, Sweep, SweepAxis};
@@ -19,9 +19,6 @@ use crate::pipeline::{Failure, Reporter};
 
 /// First steps of a search: a fifth of each range sees what is there, and stays within.
 const FIRST_STEP: f64 = 0.2;
-
-/// First steps of the second search, from the best place of the first ones: linear models that came to rest early move on.
-const SECOND_STEP: f64 = 0.04;
 
 /// By how much a constraint may be broken, of its size: rounding.
 const BROKEN: f64 = 1e-9;
@@ -118,46 +115,37 @@ pub fn optimise(
             work.source.error_at("study.starts", problem, "start once")
         })?);
     }
-    let mut settings = Settings {
+    let settings = Settings {
         optimiser: optimise.optimiser,
         tolerance: optimise.tolerance,
         first_step: FIRST_STEP,
+        steps: optimise.varied.iter().any(|varied| varied.step.is_some()),
         constraints: optimise.constraints.len(),
         // Steps that can be made let a search come to the same row again, which costs nothing.
         evaluations: 10 * optimise.evaluations,
     };
-    let mut converged = false;
     let count = starts.len();
     for (n, start) in starts.iter().enumerate() {
         // Equal shares, and what earlier ones left.
         climb.until = optimise.evaluations * (n + 1) / count;
         reporter.stage(&if count == 1 { "search".to_owned() } else { format!("search {} of {count}", n + 1) });
-        let before = climb.best();
-        let ended = search(&mut climb, start, &settings);
-        if climb.best() != before {
-            converged = ended;
-        }
+        // The first searches find the valley, what follows its bottom.
+        search(&mut climb, start, &Settings { tolerance: settings.coarse(), ..settings });
         climb.failure.take().map_or(Ok(()), Err)?;
     }
-    if let Some(best) = climb.best()
-        && climb.rows.len() < optimise.evaluations
-    {
-        reporter.stage("search about the best");
-        climb.until = optimise.evaluations;
-        settings.first_step = SECOND_STEP.max(settings.tolerance);
-        let start = climb.places[best].clone();
-        converged = search(&mut climb, &start, &settings);
-        climb.failure.take().map_or(Ok(()), Err)?;
-    }
+    climb.until = optimise.evaluations;
+    reporter.stage("search about the best");
+    let mut converged = settle(&mut climb, &settings);
+    climb.failure.take().map_or(Ok(()), Err)?;
     // Linear models do not see steps: of what comes in steps no neighbour of the best may be better.
-    if optimise.varied.iter().any(|varied| varied.step.is_some()) {
-        while let Some(best) = climb.best()
+    if settings.steps {
+        while let Some(best) = climb.best_row()
             && !climb.is_over()
         {
             let around = climb.neighbours(best);
             climb.judge(&around);
             climb.failure.take().map_or(Ok(()), Err)?;
-            if climb.best() == Some(best) {
+            if climb.best_row() == Some(best) {
                 converged = !climb.is_over();
                 break;
             }
@@ -185,12 +173,19 @@ impl Landscape for Climb<'_, '_> {
         self.failure.is_some() || self.rows.len() >= self.until
     }
 
+    fn best(&self) -> Option<(Vec<f64>, Judged)> {
+        let violation = |row: &usize| self.judged[*row].slack.iter().fold(0.0_f64, |m, s| m.max(-s));
+        let done = (0..self.rows.len()).filter(|row| self.rows[*row].reason().is_none());
+        let nearest = || done.min_by(|a, b| violation(a).total_cmp(&violation(b)));
+        self.best_row().or_else(nearest).map(|row| (self.places[row].clone(), self.judged[row].clone()))
+    }
+
     /// Central differences of a function known to ε are off by h² from its bends and by ε/h from the errors: h = ε^(1/3).
     fn difference(&self) -> f64 {
         let least = (10.0 * self.optimise.tolerance).min(0.01);
         // Against the objective where the search began: at the optimum it may be zero.
         let size = self.sizes.as_ref().map(|(size, _)| *size);
-        let relative = self.best().zip(size).and_then(|(best, size)| Some(self.error(&self.rows[best])? / size));
+        let relative = self.best_row().zip(size).and_then(|(best, size)| Some(self.error(&self.rows[best])? / size));
         relative.unwrap_or(1e-6).cbrt().clamp(least, 0.03)
     }
 }
@@ -361,13 +356,13 @@ impl Climb<'_, '_> {
     }
 
     /// The best row that holds all constraints; the first of equals.
-    fn best(&self) -> Option<usize> {
+    fn best_row(&self) -> Option<usize> {
         let holding = (0..self.rows.len()).filter(|row| self.holds(*row));
         holding.min_by(|a, b| self.judged[*a].value.total_cmp(&self.judged[*b].value))
     }
 
     fn outcome(self, converged: bool) -> Outcome {
-        let best = self.best();
+        let best = self.best_row();
         let mut active = Vec::new();
         if let Some(best) = best {
             // Within what the search tells apart.

@@ -157,14 +157,7 @@ impl Work<'_> {
                 chunk.into_par_iter().with_max_len(1).map(|point| self.stand(point)).collect();
             let mut flying = Vec::new();
             for standing in standing {
-                let standing = match standing {
-                    Ok(standing) => standing,
-                    Err(fallen) => {
-                        let (point, failure) = *fallen;
-                        rows.push(self.failed(point, &failure, done)?);
-                        continue;
-                    }
-                };
+                let Some(standing) = self.standing(standing, &mut rows, done)? else { continue };
                 let solution = solved.get_or_insert_with(|| self.solution(&standing, tally));
                 match solution {
                     Ok(_) => flying.push(standing),
@@ -191,14 +184,7 @@ impl Work<'_> {
                 flying.into_par_iter().with_max_len(1).map(|standing| planned(standing, solution)).collect();
             let mut by_table: Vec<(Option<Digest>, Vec<Standing>)> = Vec::new();
             for standing in planned {
-                let standing = match standing {
-                    Ok(standing) => standing,
-                    Err(fallen) => {
-                        let (point, failure) = *fallen;
-                        rows.push(self.failed(point, &failure, done)?);
-                        continue;
-                    }
-                };
+                let Some(standing) = self.standing(standing, &mut rows, done)? else { continue };
                 let key = standing.plan.as_ref().map(|plan| table_key(&standing.case, plan));
                 match by_table.iter_mut().find(|(known, _)| *known == key) {
                     Some((_, members)) => members.push(standing),
@@ -237,6 +223,23 @@ impl Work<'_> {
             }
         }
         Ok(rows)
+    }
+
+    /// A point that stands; one that does not becomes a row.
+    fn standing(
+        &self,
+        standing: Result<Standing, Fallen>,
+        rows: &mut Vec<Row>,
+        done: &(dyn Fn() + Sync),
+    ) -> Result<Option<Standing>, Failure> {
+        match standing {
+            Ok(standing) => Ok(Some(standing)),
+            Err(fallen) => {
+                let (point, failure) = *fallen;
+                rows.push(self.failed(point, &failure, done)?);
+                Ok(None)
+            }
+        }
     }
 
     /// The row of a point that failed, kept.
@@ -408,5 +411,7 @@ fn flights(
     let surface = obstacles(mesh, case.field.ground.as_ref(), &region);
     let induction = induction(case, source, &ready.electrodes, &**quiet)?;
     let reporter: Arc<dyn Reporter> = quiet.clone();
-    fly(case, settings, source, driven.field, induction, surface, &ready.ensemble, region, None, &reporter).map(Some)
+    // Rows tell where grains are and how fast, not what pushes them.
+    fly(case, settings, source, driven.field, induction, surface, &ready.ensemble, region, false, None, &reporter)
+        .map(Some)
 }

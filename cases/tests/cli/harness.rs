@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde_json::Value;
@@ -89,6 +89,36 @@ pub fn graintrap(args: &[&str]) -> Said {
 /// The quick case.
 pub fn tiny() -> String {
     common::folder("run").join("two_small_rings.toml").to_str().unwrap().to_owned()
+}
+
+/// `graintrap study` of a case.
+pub fn study(case: &str, out: &str, more: &[&str]) -> Said {
+    graintrap(&[&["study", case, "-o", out, "--json"], more].concat())
+}
+
+/// Starts a study on one thread, kills it when that many of its rows are kept, and gives the file they are in.
+pub fn killed_with(rows: usize, scratch: &Scratch, case: &str, out: &str) -> PathBuf {
+    let journal = Path::new(out).join("cache/points.jsonl");
+    let mut run = command(&scratch.0, &["study", case, "-o", out, "--threads", "1"]);
+    let mut child = run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let lines = || fs::read(&journal).map_or(0, |text| text.iter().filter(|byte| **byte == b'\n').count());
+    while lines() < rows {
+        assert!(child.try_wait().unwrap().is_none(), "the study ended before it was killed");
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    journal
+}
+
+/// A number of a row or of another object.
+pub fn number(row: &Value, name: &str) -> f64 {
+    row[name].as_f64().unwrap_or_else(|| panic!("no {name} in {row}"))
+}
+
+/// A file that a command left in a folder.
+pub fn file(folder: &str, name: &str) -> Vec<u8> {
+    fs::read(Path::new(folder).join(name)).unwrap_or_else(|error| panic!("{folder}/{name}: {error}"))
 }
 
 /// All files of a folder and the folders in it: path within it, and content.

@@ -8,6 +8,7 @@ mod common;
 mod analyse;
 mod bad_run;
 mod golden;
+mod grids;
 mod ground;
 mod harness;
 mod json;

@@ -2,11 +2,10 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
 
 use serde_json::Value;
 
-use crate::harness::{Said, Scratch, command, graintrap};
+use crate::harness::{Scratch, graintrap, killed_with, number, study};
 
 /// A quadrupole in closed form: nothing is solved, and every number is known.
 const QUADRUPOLE: &str = r#"
@@ -32,14 +31,6 @@ kind   = "optimise"
 center = [0, 0, 0]
 radius = "2 mm"
 "#;
-
-fn study(case: &str, out: &str, more: &[&str]) -> Said {
-    graintrap(&[&["study", case, "-o", out, "--json"], more].concat())
-}
-
-fn number(row: &Value, name: &str) -> f64 {
-    row[name].as_f64().unwrap_or_else(|| panic!("no {name} in {row}"))
-}
 
 fn close(got: f64, exact: f64, by: f64) {
     assert!((got - exact).abs() <= by, "{got} instead of {exact}");
@@ -149,16 +140,7 @@ fn cli_optimise_goes_on_after_a_kill() {
     close(number(&json["best"], "half"), 3.6151, 0.1);
     assert_eq!(json["converged"], true);
     // Killed when some rows are kept, and gone on with more threads: the same rows.
-    let journal = Path::new(&cut).join("cache/points.jsonl");
-    let mut run = command(&scratch.0, &["study", &case, "-o", &cut, "--threads", "1"]);
-    let mut child = run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-    let lines = || fs::read(&journal).map_or(0, |text| text.iter().filter(|byte| **byte == b'\n').count());
-    while lines() < 5 {
-        assert!(child.try_wait().unwrap().is_none(), "the study ended before it was killed");
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
+    killed_with(5, &scratch, &case, &cut);
     let json = study(&case, &cut, &["--threads", "2"]).done().json();
     assert!(json["rows_kept"].as_u64().unwrap() >= 5, "{}", json["rows_kept"]);
     for name in ["study.csv", "study.parquet", "history.svg", "best.toml"] {

@@ -2,11 +2,8 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
 
-use serde_json::Value;
-
-use crate::harness::{Said, Scratch, command, graintrap, tiny};
+use crate::harness::{Scratch, command, file, graintrap, killed_with, number, study, tiny};
 
 /// The quick case with a sweep behind it.
 fn swept(scratch: &Scratch, sweep: &str) -> String {
@@ -18,23 +15,11 @@ fn swept(scratch: &Scratch, sweep: &str) -> String {
 const FLOWN: &str = "\"electrode.left.dc\" = { from = \"-2 V\", to = \"2 V\", steps = 5 }\n\
                      \"grains.1.charge\" = [\"1e-14 C\", \"2e-14 C\", \"3e-14 C\"]";
 
-fn study(case: &str, out: &str, more: &[&str]) -> Said {
-    graintrap(&[&["study", case, "-o", out, "--json"], more].concat())
-}
-
-fn file(folder: &str, name: &str) -> Vec<u8> {
-    fs::read(Path::new(folder).join(name)).unwrap_or_else(|error| panic!("{folder}/{name}: {error}"))
-}
-
 /// The tables and plots of a study; not what tells times.
 fn same(one: &str, other: &str) {
     for name in ["study.csv", "study.parquet", "study.svg", "study.png"] {
         assert_eq!(file(one, name), file(other, name), "{name} of {one} and {other}");
     }
-}
-
-fn number(row: &Value, name: &str) -> f64 {
-    row[name].as_f64().unwrap_or_else(|| panic!("no {name} in {row}"))
 }
 
 #[test]
@@ -82,16 +67,7 @@ fn cli_study_goes_on_after_a_kill_and_is_shared_out() {
     assert!(json["rows"].as_array().unwrap().iter().all(|row| number(row, "grains") == 4.0));
 
     // Killed when some rows are kept.
-    let journal = Path::new(&cut).join("cache/points.jsonl");
-    let mut run = command(&scratch.0, &["study", &case, "-o", &cut, "--threads", "1"]);
-    let mut child = run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-    let lines = || fs::read(&journal).map_or(0, |text| text.iter().filter(|byte| **byte == b'\n').count());
-    while lines() < 4 {
-        assert!(child.try_wait().unwrap().is_none(), "the study ended before it was killed");
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
+    let journal = killed_with(4, &scratch, &case, &cut);
     assert!(!Path::new(&cut).join("study.csv").exists());
     // As a kill in the middle of a line would leave it.
     let text = fs::read(&journal).unwrap();
@@ -188,185 +164,4 @@ fn cli_study_refuses_what_cannot_be() {
     assert!(said.err.contains("wire_radius") && !Path::new(&scratch.at("out")).exists(), "{}", said.err);
     let said = graintrap(&["study", &case, "--shard", "3/2"]);
     assert!(said.status == Some(2) && said.err.contains("i from 1 to n"), "{}", said.err);
-}
-
-#[test]
-fn cli_study_finds_the_penetration_length_and_the_shadow_of_a_grid() {
-    let scratch = Scratch::new();
-    // A grid of 9 x 9 holes half way between two plates, with grains that feel nothing falling straight onto its middle.
-    let text = r#"
-[[electrode]]
-name  = "grid"
-shape = "grid_plate"
-size  = [9, 9]
-pitch = 1
-hole  = "square"
-open  = 0.8
-
-[[electrode]]
-name   = "top"
-shape  = "plate"
-size   = [9, 9]
-center = [0, 0, 2]
-dc     = 1
-
-[[electrode]]
-name   = "bottom"
-shape  = "plate"
-size   = [9, 9]
-center = [0, 0, -2]
-
-[field]
-accuracy = 5e-3
-
-[table]
-min      = [-2.5, -2.5, -1]
-max      = [2.5, 2.5, 1]
-spacing  = 0.5
-accuracy = 0.5
-
-[[grains]]
-count  = 100
-mass   = "1 kg"
-charge = "1e-30 C"
-place  = { kind = "box", min = [-2.5, -2.5, 0.5], max = [2.5, 2.5, 0.6] }
-speed  = { kind = "uniform", velocity = [0, 0, -1] }
-
-[trace]
-duration = 1.5
-
-[study]
-kind   = "grid_transparency"
-center = [0, 0, 1]
-radius = 0.5
-angles = ["0 deg", "45 deg"]
-cone   = "20 deg"
-
-[sweep]
-sampling = "zip"
-"electrode.grid.hole" = ["square", "round"]
-"electrode.grid.open" = [0.8, 0.6]
-"#;
-    let case = scratch.file("sandwich.toml", text);
-    let json = study(&case, &scratch.at("out"), &[]).done().json();
-    let rows = json["rows"].as_array().unwrap();
-    // tests/reference/grid_plate.json: square_mesh_flat.b=0.2 and hole_array.a=0.3, for endless plates.
-    for (row, (delta, open)) in
-        rows.iter().zip([(0.074_857_631_1, 0.64), (0.019_097_969_99, std::f64::consts::PI * 0.09)])
-    {
-        let (got, error) = (number(row, "delta"), number(row, "delta_error"));
-        println!("delta {got:.6} of {delta:.6}, error told {error:.1e}");
-        assert!((got / delta - 1.0).abs() < 1e-2, "delta {got} instead of {delta}");
-        assert!((number(row, "open_fraction") - open).abs() < 1e-12);
-        // Sheets: as open from everywhere, as rays tell it, some 1/√N of a fifth of the cell.
-        for name in ["light.0deg", "light.45deg", "light.cone"] {
-            assert!((number(row, name) - open).abs() < 5e-3, "{name} of {row}");
-        }
-        // Grains that feel nothing see what light sees: within the interval of 95 %, a little widened, of 100 of them.
-        let passed = number(row, "grains_passed");
-        assert!((passed - open).abs() < 1.5 * number(row, "grains_passed_error"), "{passed} of {open} passed");
-        assert!((passed + number(row, "grains_caught") - 1.0).abs() < 1e-12, "none turns back");
-        assert!(number(row, "grains_passed_low") < passed && passed < number(row, "grains_passed_high"));
-    }
-    // Smaller holes, darker and nearer to the plate: both are on the front.
-    assert!(number(&rows[0], "field_deviation_max") > number(&rows[1], "field_deviation_max"));
-    assert_eq!(json["front"]["front"], serde_json::json!([2, 1]));
-    assert!(Path::new(&scratch.at("out")).join("front.png").is_file());
-    // Every strike has its row, on a bar of the cell whose corner is the middle of a hole.
-    let csv = String::from_utf8(file(&scratch.at("out"), "strikes.csv")).unwrap();
-    let caught: f64 = rows.iter().map(|row| 100.0 * number(row, "grains_caught")).sum();
-    assert_eq!(csv.lines().count(), 1 + caught.round() as usize);
-    for line in csv.lines().filter(|line| line.starts_with("1,")) {
-        let cell: Vec<f64> = line.split(',').skip(6).take(2).map(|x| x.parse().unwrap()).collect();
-        assert!(cell.iter().any(|x| (x - 0.5).abs() < 0.1 + 1e-9), "{line}");
-    }
-    // Rows and strikes are joined from the folder of the study without any work.
-    let joined = scratch.at("joined");
-    let again = study(&case, &joined, &["--merge", &scratch.at("out")]).done().json();
-    assert_eq!(again["solved"].as_u64(), Some(0));
-    for name in ["study.csv", "front.png", "strikes.csv", "strikes.png"] {
-        assert_eq!(file(&scratch.at("out"), name), file(&joined, name), "{name}");
-    }
-    // A case without a grid.
-    let said = graintrap(&[
-        "study",
-        &swept(&scratch, FLOWN),
-        "--set",
-        "study.kind=grid_transparency",
-        "-o",
-        &scratch.at("no"),
-    ]);
-    assert!(said.err.contains("study.kind: the case has no grid to study"), "{}", said.err);
-}
-
-#[test]
-fn cli_study_follows_lines_through_wires() {
-    let scratch = Scratch::new();
-    // Seven wires of r/s = 0.1 half way between plates; no grains, one solution for all voltages.
-    let text = r#"
-[[electrode]]
-name        = "grid"
-shape       = "grid_plate"
-size        = [7, 7]
-pitch       = 1
-wires       = "parallel"
-wire_radius = 0.1
-
-[[electrode]]
-name   = "top"
-shape  = "plate"
-size   = [9, 9]
-center = [0, 0, 2]
-dc     = 1
-
-[[electrode]]
-name   = "bottom"
-shape  = "plate"
-size   = [9, 9]
-center = [0, 0, -2]
-
-[field]
-accuracy = 1e-2
-
-[table]
-min = [-1.5, -1.5, -1.5]
-max = [1.5, 1.5, 1.5]
-
-[study]
-kind   = "grid_transparency"
-center = [0, 0, 1]
-radius = 0.5
-rays   = 100
-lines  = 300
-
-[sweep]
-"electrode.bottom.dc" = [-1, -3, -4.6]
-"#;
-    let case = scratch.file("wires.toml", text);
-    let json = study(&case, &scratch.at("out"), &[]).done().json();
-    assert_eq!((json["solved"].as_u64(), json["failed"].as_u64()), (Some(2), Some(0)));
-    let rows = json["rows"].as_array().unwrap();
-    // Equal fields on both sides: 38.714 % of the lines end on endless wires (potential theory of the lattice). Even points miss each
-    // of two edges by up to 1/300.
-    for side in ["above", "below"] {
-        let caught = number(&rows[0], &format!("lines_caught.{side}"));
-        assert!((caught - 0.387_14).abs() < 0.01, "{side}: {caught}");
-        assert!((caught + number(&rows[0], &format!("lines_passed.{side}")) - 1.0).abs() < 1e-12);
-    }
-    // All lines of the weaker side come through from a ratio of 3.66602 on.
-    for row in &rows[1..] {
-        let ratio = number(row, "field_below") / number(row, "field_above");
-        let caught = number(row, "lines_caught.above");
-        println!("ratio {ratio:.4}: {caught} caught");
-        assert!((ratio - 3.666).abs() > 0.1 && (caught == 0.0) == (ratio > 3.666), "{ratio}: {caught}");
-        // As many lines pass from below as above has.
-        let passed = number(row, "lines_passed.below");
-        assert!((passed - (1.0 - caught) / ratio).abs() < 0.01, "{passed} of 1/{ratio}");
-    }
-    // Wires of tests/reference/grid_plate.json, r/d = 0.1, to 1 %.
-    let delta = number(&rows[0], "delta");
-    assert!((delta / 0.073_874_505 - 1.0).abs() < 1e-2, "{delta}");
-    // The ripple of the field of charged wires, 2 e^(-2πz/d) of half the jump, is 1 % of it some 0.8 pitches away.
-    let depth = number(&rows[0], "ripple_above");
-    assert!((0.3..1.0).contains(&depth), "{depth}");
 }

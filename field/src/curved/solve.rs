@@ -1,6 +1,7 @@
 //! Solving for the charge of a curved mesh.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use faer::{Mat, Par};
 use meshes::Vec3;
@@ -16,6 +17,7 @@ use crate::boundary_problem::SolveError;
 use crate::constants::COULOMB;
 use crate::gauss::gauss;
 use crate::linear::solve_transposed;
+use crate::multipole::IterativeError;
 use crate::plane::Plane;
 use crate::source::Source;
 use crate::symmetry::Symmetry;
@@ -150,7 +152,7 @@ impl CurvedProblem<'_> {
         accuracy: f64,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<CurvedSolution, SolveError> {
-        let start = std::time::Instant::now();
+        let start = Instant::now();
         let (points, electrode) = (mesh.points(), mesh.electrode_of_points());
         let wanted = self.wanted(mesh, &points, &electrode)?;
         let symmetry = self.symmetry(&points, &electrode, &wanted);
@@ -160,42 +162,57 @@ impl CurvedProblem<'_> {
             CurvedBy::Matrix => false,
             CurvedBy::Multipoles => true,
         };
-        let mut values = Mat::<f64>::zeros(points.len(), wanted.ncols());
-        let (mut unknowns, mut matrix_bytes, mut iterations) = (0, 0, 0);
-        let (assembly, assembled);
-        if iterate {
-            assembly = Assembly::new(mesh, &points, self.ground, accuracy);
+        let mut charges = Charges::new(points.len(), wanted.ncols());
+        let needed = Self::memory_needed(symmetry.representatives.len(), parts.len(), points.len());
+        let assembly = Assembly::new(mesh, &points, self.ground, accuracy);
+        // When the operator was ready.
+        let iterated = |charges: &mut Charges| -> Result<Instant, SolveError> {
             let (columns, most) = (wanted.ncols(), self.max_bytes);
             let operator = Iterative::new(mesh, &assembly, &points, &symmetry, self.ground, accuracy, columns, most)?;
-            assembled = std::time::Instant::now();
+            let ready = Instant::now();
             progress(0.4);
-            matrix_bytes = operator.bytes();
+            charges.matrix_bytes = operator.bytes();
             for (s, (sector, part)) in parts.iter().enumerate() {
                 let done = |f: f64| progress(0.4 + 0.6 * (s as f64 + f) / parts.len() as f64);
                 let solved = operator.solve(*sector, part.as_ref(), &done)?;
-                unknowns += solved.values.nrows();
-                iterations += solved.iterations;
-                Symmetry::unfold(&solved.values, &solved.of, &mut values);
+                charges.unknowns += solved.values.nrows();
+                charges.iterations += solved.iterations;
+                Symmetry::unfold(&solved.values, &solved.of, &mut charges.values);
             }
+            Ok(ready)
+        };
+        let iterated = match iterate.then(|| iterated(&mut charges)) {
+            // Thin wires between plates, of which a patch of elements sees nothing: where the matrix fits it knows no such limit.
+            Some(Err(SolveError::Iterative(IterativeError::NotConverged { .. })))
+                if self.by == CurvedBy::Size && needed <= self.max_bytes =>
+            {
+                charges = Charges::new(points.len(), wanted.ncols());
+                None
+            }
+            Some(done) => Some(done?),
+            None => None,
+        };
+        let assembled = if let Some(ready) = iterated {
+            ready
         } else {
-            let needed = Self::memory_needed(symmetry.representatives.len(), parts.len(), points.len());
             if needed > self.max_bytes {
                 let (unknowns, available) = (symmetry.representatives.len(), self.max_bytes);
                 return Err(SolveError::TooLarge { unknowns, needed, available });
             }
             let sectors: Vec<u32> = parts.iter().map(|(sector, _)| *sector).collect();
-            assembly = Assembly::new(mesh, &points, self.ground, accuracy);
             let matrices = assembly.matrices(&symmetry, &sectors, &|f| progress(0.9 * f));
-            assembled = std::time::Instant::now();
+            let ready = Instant::now();
             for ((sector, part), matrix) in parts.iter().zip(matrices) {
                 let (of, own) = symmetry.orbits(*sector);
-                unknowns += own.len();
-                matrix_bytes += 8 * (own.len() * own.len()) as u64;
+                charges.unknowns += own.len();
+                charges.matrix_bytes += 8 * (own.len() * own.len()) as u64;
                 let mut columns = Mat::from_fn(own.len(), part.ncols(), |i, c| part[(own[i] as usize, c)]);
                 solve_transposed(matrix, &mut columns, Par::rayon(0));
-                Symmetry::unfold(&columns, &of, &mut values);
+                Symmetry::unfold(&columns, &of, &mut charges.values);
             }
-        }
+            ready
+        };
+        let Charges { values, unknowns, matrix_bytes, iterations } = charges;
         let each = mesh.order * mesh.order;
         let rule = gauss(mesh.order);
         let mut totals = vec![vec![0.0; wanted.ncols()]; mesh.electrodes];
@@ -219,6 +236,20 @@ impl CurvedProblem<'_> {
             assembly_seconds: (assembled - start).as_secs_f64(),
             solve_seconds: assembled.elapsed().as_secs_f64(),
         })
+    }
+}
+
+/// The charges of all points, and what they took.
+struct Charges {
+    values: Mat<f64>,
+    unknowns: usize,
+    matrix_bytes: u64,
+    iterations: usize,
+}
+
+impl Charges {
+    fn new(points: usize, columns: usize) -> Self {
+        Self { values: Mat::zeros(points, columns), unknowns: 0, matrix_bytes: 0, iterations: 0 }
     }
 }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_4, TAU};
 
 use super::{Patch, PatchForm, Path, Side};
-use crate::lattice::{hole_lattice, holes_along};
+use crate::lattice::{hole_lattice, hole_spans, holes_along};
 use crate::profile::{Curve, Profile, Revolved, revolved};
 use crate::{GridPattern, Hole, Outline, Shape, Vec3};
 
@@ -31,8 +31,8 @@ pub fn patches(shape: &Shape) -> Option<Vec<Patch>> {
             Some(plate(&face, &|_| [true; 4], c))
         }
         Shape::GridPlate { outline: Outline::Rectangle(size), pitch, pattern } => match pattern {
-            GridPattern::Perforated { hole: Hole::Square, open, thickness } => {
-                Some(square_holes(size, pitch, open, thickness))
+            GridPattern::Perforated { hole: hole @ (Hole::Square | Hole::Slot), open, thickness } => {
+                Some(rectangular_holes(size, pitch, hole, open, thickness))
             }
             GridPattern::Perforated { hole: Hole::Round, open, thickness } => {
                 Some(round_holes(size, pitch, open, thickness))
@@ -133,20 +133,32 @@ fn plate(faces: &[Rectangle], bare: &dyn Fn(usize) -> [bool; 4], thickness: f64)
     all
 }
 
-/// Square holes on a rectangle: the rectangles between the lines of all holes' edges.
-fn square_holes([a, b]: [f64; 2], pitch: f64, open: f64, thickness: f64) -> Vec<Patch> {
-    let lines = |side: f64| -> Vec<f64> {
-        let n = holes_along(side, pitch);
-        let center = |k: usize| (k as f64 - 0.5 * (n as f64 - 1.0)) * pitch;
-        let mut lines = vec![-0.5 * side];
-        lines.extend((0..n).flat_map(|k| [center(k) - 0.5 * open, center(k) + 0.5 * open]));
+/// Square holes or slots on a rectangle: the rectangles between the lines of all holes' edges, those along a slot cut into pieces of
+/// about a pitch.
+fn rectangular_holes(size: [f64; 2], pitch: f64, hole: Hole, open: f64, thickness: f64) -> Vec<Patch> {
+    let [across, along] = hole_spans(size, pitch, hole, open);
+    // Lines, and which of the gaps between them are those of holes.
+    let lines = |side: f64, spans: &[[f64; 2]]| -> (Vec<f64>, Vec<bool>) {
+        let (mut lines, mut open) = (vec![-0.5 * side], Vec::new());
+        for [from, to] in spans {
+            let pieces = ((to - from) / pitch).ceil();
+            lines.push(*from);
+            open.push(false);
+            for k in 1..=pieces as usize {
+                // Ends as they are, and what stands between them symmetric to the last bit.
+                let (k, rest) = (k as f64, pieces - k as f64);
+                lines.push((from * rest + to * k) / pieces);
+                open.push(true);
+            }
+        }
         lines.push(0.5 * side);
-        lines
+        open.push(false);
+        (lines, open)
     };
-    let (xs, ys) = (lines(a), lines(b));
+    let ((xs, open_x), (ys, open_y)) = (lines(size[0], &across), lines(size[1], &along));
     let metal = |i: i64, j: i64| {
-        let inside = i >= 0 && j >= 0 && i < xs.len() as i64 - 1 && j < ys.len() as i64 - 1;
-        inside && !(i % 2 == 1 && j % 2 == 1)
+        let inside = i >= 0 && j >= 0 && i < open_x.len() as i64 && j < open_y.len() as i64;
+        inside && !(open_x[i as usize] && open_y[j as usize])
     };
     let (mut faces, mut bare) = (Vec::new(), Vec::new());
     for i in 0..xs.len() as i64 - 1 {

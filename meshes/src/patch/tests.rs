@@ -20,6 +20,8 @@ fn shapes() -> Vec<Shape> {
         Shape::Plate { size: [1.0, 0.7], thickness: 0.1 },
         holes(Hole::Square, 0.0),
         holes(Hole::Square, 0.05),
+        holes(Hole::Slot, 0.0),
+        holes(Hole::Slot, 0.05),
         holes(Hole::Round, 0.0),
         holes(Hole::Round, 0.05),
         Shape::GridPlate {

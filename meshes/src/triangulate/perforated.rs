@@ -8,7 +8,7 @@ use super::flat::thicken;
 use super::grading::{End, count_for, lines};
 use super::patchwork::Patchwork;
 use super::planar::{Loop, fill, winding};
-use crate::lattice::{hole_lattice, holes_along};
+use crate::lattice::{hole_lattice, hole_spans, holes_along, slot_half_length};
 use crate::{Hole, Outline, ShapeError, Vec3};
 
 /// How finely one cell is meshed.
@@ -36,12 +36,18 @@ pub(super) fn plate(
     let fine = Fineness { along, across };
     let width = step.max(bar);
     let sheet = match (outline, hole) {
-        (Outline::Rectangle(size), Hole::Square) => square_in_rectangle(size, pitch, open, &fine),
+        (Outline::Rectangle(size), Hole::Square | Hole::Slot) => {
+            rectangular_in_rectangle(size, pitch, hole, open, &fine)
+        }
         (Outline::Rectangle(size), Hole::Round) => round_in_rectangle(size, pitch, open, &fine),
         _ => {
             let mut work = Patchwork::default();
             for center in hole_lattice(outline, pitch, hole) {
-                cell(&mut work, center, hole, pitch, open, &fine);
+                if hole == Hole::Slot {
+                    slot(&mut work, center, slot_half_length(outline, pitch, open, center[0]), pitch, open, &fine);
+                } else {
+                    cell(&mut work, center, hole, pitch, open, &fine);
+                }
             }
             with_rim(work.finish(), outline, 0.5 * (pitch - open), width)?
         }
@@ -49,12 +55,12 @@ pub(super) fn plate(
     Ok(thicken(sheet, thickness, width))
 }
 
-/// Square holes in a rectangle: one grid of lines, left out where a hole is.
-fn square_in_rectangle(size: [f64; 2], pitch: f64, open: f64, fine: &Fineness) -> Triangulation {
+/// Square holes or slots in a rectangle: one grid of lines, left out where a hole is.
+fn rectangular_in_rectangle(size: [f64; 2], pitch: f64, hole: Hole, open: f64, fine: &Fineness) -> Triangulation {
+    let [across, along] = hole_spans(size, pitch, hole, open);
     // Along each direction: alternating bars and holes, the outermost bars as wide as what is left.
-    let spans = |side: f64| {
-        let holes = holes_along(side, pitch);
-        let first = 0.5 * (side - (holes - 1) as f64 * pitch - open);
+    let spans = |side: f64, holes: &[[f64; 2]]| {
+        let first = holes[0][0] + 0.5 * side;
         let mut marks = vec![0.0];
         let mut is_hole = Vec::new();
         let mut at = -0.5 * side;
@@ -73,9 +79,10 @@ fn square_in_rectangle(size: [f64; 2], pitch: f64, open: f64, fine: &Fineness) -
         let border =
             (2 * fine.across).max(count_for((open / fine.along as f64 / first).min(1.0), End::Free, End::Free));
         add(first, border, false, &mut marks);
-        for h in 0..holes {
-            add(open, fine.along, true, &mut marks);
-            let last = h + 1 == holes;
+        for (h, [from, to]) in holes.iter().enumerate() {
+            // A slot is some pitches long.
+            add(to - from, fine.along * ((to - from) / pitch).ceil() as usize, true, &mut marks);
+            let last = h + 1 == holes.len();
             add(
                 if last { first } else { pitch - open },
                 if last { border } else { 2 * fine.across },
@@ -85,7 +92,7 @@ fn square_in_rectangle(size: [f64; 2], pitch: f64, open: f64, fine: &Fineness) -
         }
         (marks, is_hole)
     };
-    let ((xs, hole_x), (ys, hole_y)) = (spans(size[0]), spans(size[1]));
+    let ((xs, hole_x), (ys, hole_y)) = (spans(size[0], &across), spans(size[1], &along));
     let mut work = Patchwork::default();
     let number: Vec<Vec<u32>> =
         xs.iter().map(|&x| ys.iter().map(|&y| work.vertex(Vec3::new(x, y, 0.0))).collect()).collect();
@@ -166,10 +173,30 @@ fn cell(work: &mut Patchwork, center: [f64; 2], hole: Hole, pitch: f64, open: f6
                     let angle = TAU * (k as f64 - 0.5 + v) / sides as f64;
                     [round * angle.cos(), round * angle.sin()]
                 }
-                Hole::Square | Hole::Hexagonal => on_polygon(open, k, v),
+                _ => on_polygon(open, k, v),
             };
             let outer = on_polygon(pitch, k, v);
             let mix = |i: usize| center[i] + inner[i] * (1.0 - u) + outer[i] * u;
+            Vec3::new(mix(0), mix(1), 0.0)
+        });
+    }
+}
+
+/// One slot: the half of its bars that is nearer to it, on all four sides. Slots of a disc differ in length, so that what is left
+/// between them fits no pattern.
+fn slot(work: &mut Patchwork, center: [f64; 2], half: f64, pitch: f64, open: f64, fine: &Fineness) {
+    let margin = 0.25 * (pitch - open);
+    let depth: Vec<f64> = lines(fine.across, End::Free, End::Smooth);
+    let corner = |k: usize, by: f64| {
+        let (x, y) = (0.5 * open + by, half + by);
+        [[x, -y], [x, y], [-x, y], [-x, -y]][k % 4]
+    };
+    let long = fine.along * (2.0 * half / pitch).ceil().max(1.0) as usize;
+    for k in 0..4 {
+        let along = lines(if k % 2 == 0 { long } else { fine.along }, End::Smooth, End::Smooth);
+        work.grid(&depth, &along, |u, v| {
+            let (a, b) = (corner(k, u * margin), corner(k + 1, u * margin));
+            let mix = |i: usize| center[i] + a[i] * (1.0 - v) + b[i] * v;
             Vec3::new(mix(0), mix(1), 0.0)
         });
     }

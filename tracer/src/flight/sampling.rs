@@ -3,8 +3,8 @@
 use meshes::Vec3;
 
 use super::{Loop, Run, finite};
-use crate::Sample;
 use crate::integrator::Integrator;
+use crate::{Options, Sample};
 
 /// A sample without its forces.
 pub(super) struct Point {
@@ -83,6 +83,17 @@ impl<I: Integrator> Loop<'_, '_, I> {
     }
 
     fn complete(&mut self, points: &[Point]) -> Vec<Sample> {
+        let Options { forces, start, .. } = *self.run.options;
+        if !forces && points.iter().all(|p| p.time > start) {
+            let bare = |p: &Point| Sample {
+                time: p.time,
+                position: p.position,
+                velocity: p.velocity,
+                force: Vec3::zeros(),
+                potential_energy: 0.0,
+            };
+            return points.iter().map(bare).collect();
+        }
         let lanes: Vec<usize> = points.iter().map(|p| p.lane).collect();
         let time: Vec<f64> = points.iter().map(|p| p.time).collect();
         let position: Vec<Vec3> = points.iter().map(|p| p.position).collect();
