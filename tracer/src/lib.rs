@@ -83,7 +83,8 @@
 //!
 //! Elsewhere it is Dormand and Prince's of order 8, whose dense output gives samples, and the time and place of a strike, to the
 //! accuracy of the steps themselves. [`Method`] lists the others; `Stoermer12` takes a quarter of the forces where these are
-//! smooth and dear. Surfaces cost nothing while a grain is far from them, and no step is too long for a wire to be met.
+//! smooth and dear, and hundreds of grains that feel each other in a smooth field fly by `Stoermer`, the same with steps from the
+//! tolerance. Surfaces cost nothing while a grain is far from them, and no step is too long for a wire to be met.
 //!
 //! The mutual force of some thousand grains is summed pair by pair, that of more by multipoles to an accuracy
 //! ([`Coulomb`]). [`stability`] maps where motions in a quadrupole stay bounded, without flying grains at all.
