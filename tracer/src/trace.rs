@@ -115,7 +115,7 @@ fn resolve(system: &System, grains: usize, options: &Options) -> Result<Method, 
 }
 
 /// Grains from which on their mutual forces are so dear that `Auto` takes the multistep, if the other forces are smooth. Above
-/// [`MANY`](crate::force::coulomb::MANY) these forces themselves jump.
+/// [`MANY`] these forces themselves jump.
 pub const DEAR: usize = 100;
 
 /// Where a run stands that was never begun.
