@@ -111,11 +111,11 @@ impl Session {
     }
 }
 
-/// The name of a case: its folder's where the file is `case.toml`, else the file's.
+/// The name of a case: its folder's where the file is `case.toml` or `study.toml`, else the file's.
 fn name(path: &Path) -> String {
     let of = |part: Option<&std::ffi::OsStr>| part.map(|p| p.to_string_lossy().into_owned());
     let stem = of(path.file_stem()).unwrap_or_else(|| "case".to_owned());
-    if stem != "case" {
+    if stem != "case" && stem != "study" {
         return stem;
     }
     let folder = path.parent().and_then(|folder| of(folder.file_name()));
@@ -131,6 +131,7 @@ mod tests {
     #[test]
     fn a_case_is_named_after_its_folder_or_its_file() {
         assert_eq!(name(Path::new("cases/two_rings/case.toml")), "two_rings");
+        assert_eq!(name(Path::new("cases/optimal_rings/study.toml")), "optimal_rings");
         assert_eq!(name(Path::new("designs/trap3.toml")), "trap3");
         assert!(!name(Path::new("case.toml")).is_empty());
     }
