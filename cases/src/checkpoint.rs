@@ -22,7 +22,7 @@ use crate::pipeline::Failure;
 pub const CHECKPOINT: &str = "checkpoint.bin";
 
 /// Raised when the same case flies otherwise than before, or the stored form changes.
-const EDITION: u32 = 1;
+const EDITION: u32 = 2;
 
 /// Time between frames of a block when the case does not say: what a person can afford to lose.
 pub const INTERVAL: Duration = Duration::from_secs(10);
@@ -129,8 +129,9 @@ fn frame(file: &mut impl Read, left: u64) -> Result<(Frame, u64), Broken> {
     let mut seal = [0; SEAL];
     file.read_exact(&mut content).and_then(|()| file.read_exact(&mut seal)).map_err(|_| Broken::Short)?;
     if seal != digest(&[&content])[..SEAL] {
-        // A file system may have kept room for the last frame without its content.
-        return Err(if bytes == left { Broken::Short } else { Broken::Damaged });
+        // A file system may have kept room for the last frame without its content: then its end is empty.
+        let empty = bytes == left && seal == [0; SEAL];
+        return Err(if empty { Broken::Short } else { Broken::Damaged });
     }
     let frame = postcard::from_bytes(&content).map_err(|_| Broken::Damaged)?;
     Ok((frame, bytes))

@@ -10,7 +10,7 @@ use crate::{Journal, Standing, TraceError};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
     /// `Langevin` when there is noise; `BlanesMoan14`, with a step from the tolerance, in forces that are linear in the
-    /// position; else `Dop853`.
+    /// position; `Stoermer` for 100 to 4000 grains that feel each other in smooth fields; else `Dop853`.
     #[default]
     Auto,
     /// Dormand and Prince's 8(5,3): order 8, adaptive, dense output of order 7. For any force without noise.

@@ -6,6 +6,7 @@ use tracer::{Ensemble, Region};
 
 use super::choice::{Choice, Elements, choose, of_joined};
 use super::surface::{Electrodes, check_contacts, check_ground};
+use super::tables::many_coupled_flights;
 use super::{Failure, Reporter, drives, flights, memory, region};
 use crate::CaseSource;
 use crate::case::{Case, GROUND, SourceKind};
@@ -150,7 +151,14 @@ fn check_table(case: &Case, source: &CaseSource, mesh: &SurfaceMesh, sources: &[
     let available = table_memory(case);
     let needed = |spacing: f64| {
         let bricks = PotentialTable::bricks_for(bounds.min, bounds.max, spacing);
-        (bricks.nodes(), PotentialTable::bytes_while_filling(&bricks, functions, case.table.accuracy <= field::SMOOTH))
+        (
+            bricks.nodes(),
+            PotentialTable::bytes_while_filling(
+                &bricks,
+                functions,
+                case.table.accuracy <= field::SMOOTH || many_coupled_flights(case),
+            ),
+        )
     };
     let (nodes, bytes) = needed(spacing);
     if bytes <= available {

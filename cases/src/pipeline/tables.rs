@@ -72,7 +72,7 @@ impl Plan {
 
 /// Whether grains that feel each other fly so long that a smooth table, which takes about four times the bricks, is soon paid back: the
 /// multistep needs a third of the forces that `Dop853` does, but not where derivatives jump from cell to cell.
-fn many_coupled_flights(case: &Case) -> bool {
+pub(super) fn many_coupled_flights(case: &Case) -> bool {
     /// Pairs of a flight that take half a minute.
     const PAIRS: f64 = 3e10;
     /// Forces that `Dop853` takes in a period of the drives, in clouds at rest.

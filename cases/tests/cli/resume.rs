@@ -66,10 +66,16 @@ fn cli_a_killed_run_goes_on_to_the_same_bits() {
     // The field was kept with the first frame.
     assert_eq!(resumed.json()["reused"], serde_json::json!(["solution", "table"]));
 
-    // A frame cut short, and one of which a bit was turned: the flights go on from what is sound.
+    // A frame cut short, one that was given room but nothing else, and one of which a bit was turned: the flights go on from what is sound.
     let file = kill_at(&case, &cut, &[], 100_000);
     let bytes = fs::read(&file).unwrap();
     fs::write(&file, &bytes[..bytes.len() - 1000]).unwrap();
+    let said = resume(&case, &cut, &[]).done();
+    assert!(results(&cut) == undisturbed && !said.err.contains("damaged"), "{said:?}");
+    let mut empty = bytes.clone();
+    empty.extend(5000_u64.to_le_bytes());
+    empty.resize(empty.len() + 5000 + 16, 0);
+    fs::write(&file, empty).unwrap();
     let said = resume(&case, &cut, &[]).done();
     assert!(results(&cut) == undisturbed && !said.err.contains("damaged"), "{said:?}");
     let mut turned = bytes.clone();

@@ -288,7 +288,7 @@ impl Integrator for AdaptiveStoermer {
         } else {
             Phase::Single(Single { good, tries: second, flown: length, least: other })
         };
-        let past: Vec<&[f64]> = memory.iter().map(|numbers| &numbers[OWN..]).collect();
+        let past: Vec<&[f64]> = memory.iter().map(|numbers| numbers.get(OWN..).unwrap_or_default()).collect();
         self.past.remember(block, &past);
     }
 

@@ -269,7 +269,7 @@ impl Past {
         self.filled = (*filled as usize).min(KEPT);
         self.make_room(block);
         for (lane, numbers) in memory.iter().enumerate() {
-            let mut numbers = numbers[Self::SHARED..].chunks_exact(3);
+            let mut numbers = numbers.get(Self::SHARED..).unwrap_or_default().chunks_exact(3);
             for list in self.history[..self.filled].iter_mut().chain([&mut self.chord, &mut self.next]) {
                 list[3 * lane..3 * lane + 3].copy_from_slice(numbers.next().unwrap_or(&[0.0; 3]));
             }
