@@ -151,14 +151,8 @@ fn check_table(case: &Case, source: &CaseSource, mesh: &SurfaceMesh, sources: &[
     let available = table_memory(case);
     let needed = |spacing: f64| {
         let bricks = PotentialTable::bricks_for(bounds.min, bounds.max, spacing);
-        (
-            bricks.nodes(),
-            PotentialTable::bytes_while_filling(
-                &bricks,
-                functions,
-                case.table.accuracy <= field::SMOOTH || many_coupled_flights(case),
-            ),
-        )
+        let smooth = many_coupled_flights(case);
+        (bricks.nodes(), PotentialTable::bytes_while_filling(&bricks, functions, case.table.accuracy, smooth))
     };
     let (nodes, bytes) = needed(spacing);
     if bytes <= available {

@@ -4,10 +4,10 @@ use meshes::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::PotentialTable;
 use super::kernel::Kernel;
 use super::octree::Brick;
-use super::spline::{CELLS, Splines};
-use super::{PotentialTable, reach_for};
+use super::spline::CELLS;
 use crate::{BasisField, PanelSum, Samples};
 
 /// What a table is like.
@@ -79,7 +79,7 @@ pub(super) fn measure(table: &PotentialTable, clearance: &[f32], exact: &PanelSu
     // One function after the other: splines of all of them may not fit in memory.
     for c in 0..n {
         let unit: Vec<f64> = (0..n).map(|k| f64::from(u8::from(k == c))).collect();
-        let kernel = Kernel::new(octree, Splines::new(table, reach_for(table.smooth), &[unit]));
+        let kernel = Kernel::new(table, &[unit]);
         let errors: Vec<[f64; 6]> = drawn
             .par_iter()
             .enumerate()

@@ -7,7 +7,9 @@
 //! A [`PotentialTable`] holds the derivatives of the basis functions at the corners of bricks; it is what is kept in files. A
 //! [`TabulatedField`] holds splines of the channels that follow from it; it is what grains fly in.
 
+mod bspline;
 mod fill;
+mod finder;
 mod grid;
 mod hermite;
 mod kernel;
@@ -15,6 +17,7 @@ mod lanes;
 mod measure;
 mod octree;
 mod refine;
+mod rows;
 mod spline;
 mod tabulate;
 #[cfg(test)]
@@ -35,7 +38,6 @@ pub use tabulate::{TableError, TableOptions, halvings_for, tabulate, tabulate_ar
 use crate::panel_sum::PanelSum;
 use crate::{BasisField, ElectrodeBasis, Samples};
 use kernel::Kernel;
-use spline::Splines;
 
 /// Cells of a table along the edge of one of its bricks.
 pub const CELLS_PER_BRICK: usize = spline::CELLS;
@@ -133,10 +135,10 @@ impl PotentialTable {
 
     /// Bytes that [`tabulate`] takes at its peak for a grid of bricks, and flights after it: what nodes hold, a third more for what
     /// is computed but not yet stored, and splines of all functions.
-    pub fn bytes_while_filling(bricks: &Grid, functions: usize, smooth: bool) -> u64 {
+    pub fn bytes_while_filling(bricks: &Grid, functions: usize, accuracy: f64, smooth: bool) -> u64 {
         let nodes = (8 * PER_NODE as u64 * functions as u64).saturating_mul(bricks.nodes() as u64);
         let bricks = bricks.cells.iter().fold(1, |n: usize, c| n.saturating_mul(*c));
-        let splines = Splines::bytes_for(reach_for(smooth), bricks, functions);
+        let splines = Kernel::bytes_for(accuracy, smooth || accuracy <= SMOOTH, bricks, functions);
         (nodes / 3).saturating_mul(4).saturating_add(splines)
     }
 
@@ -149,11 +151,6 @@ impl PotentialTable {
 /// Accuracy of the field from which on splines are of degree five: they take two and a half times as long and as much memory, and
 /// where this much is asked cubic ones would need more than that many more bricks.
 pub const SMOOTH: f64 = 3e-5;
-
-/// What the splines of a table are.
-fn reach_for(smooth: bool) -> usize {
-    if smooth { spline::QUINTIC } else { spline::CUBIC }
-}
 
 /// A table with the exact sum for what it does not cover.
 pub struct TabulatedField {
@@ -171,11 +168,7 @@ impl TabulatedField {
 
     /// A table's functions combined to channels, with what is exact for the same channels.
     pub fn new(table: &PotentialTable, weights: &[Vec<f64>], exact: Arc<PanelSum>) -> Self {
-        Self {
-            kernel: Kernel::new(&table.octree, Splines::new(table, reach_for(table.smooth), weights)),
-            smooth: table.smooth,
-            exact,
-        }
+        Self { kernel: Kernel::new(table, weights), smooth: table.smooth, exact }
     }
 
     /// Bytes of the splines.

@@ -11,7 +11,6 @@
 //! by the two-scale relation B(x) = Σ_k 2^-d C(d + 1, k) B(2 x - k + (d + 1)/2), so that the same holds between bricks of
 //! different size. Checked by `bricks_join_smoothly`.
 
-use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use super::PotentialTable;
@@ -37,85 +36,72 @@ pub(super) const fn stride(reach: usize) -> usize {
     if reach == CUBIC { 8 } else { 12 }
 }
 
-/// Numbers of a brick for one channel: rows `y + edge z`, in whole lines of memory.
+/// Numbers of a brick: rows `y + edge z`.
 pub(super) const fn per_brick(reach: usize) -> usize {
-    (edge(reach) * edge(reach) * stride(reach)).next_multiple_of(8)
+    edge(reach) * edge(reach) * stride(reach)
 }
 
-/// A line of memory.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C, align(64))]
-pub(super) struct Line([f64; 8]);
-
-/// Splines of all interpolated bricks.
+/// Splines of a function in all interpolated bricks.
 pub(super) struct Splines {
     /// [`CUBIC`] or [`QUINTIC`].
-    pub reach: usize,
-    /// Number of channels.
-    pub channels: usize,
-    /// Where each brick's numbers are, in bricks; [`NONE`] for bricks that are not interpolated.
-    pub slots: Vec<u32>,
-    lines: Vec<Line>,
+    reach: usize,
+    /// Coefficients: entry `slot * per_brick + x + stride (y + edge z)`.
+    pub numbers: Vec<f64>,
+}
+
+/// Where each brick's numbers are, counted in bricks; [`NONE`] for bricks that are not interpolated.
+pub(super) fn slots(octree: &Octree) -> Vec<u32> {
+    let mut slots = vec![NONE; octree.all().len()];
+    for (slot, (number, _)) in kept(octree).enumerate() {
+        slots[number] = slot as u32;
+    }
+    slots
+}
+
+/// Interpolated bricks, with their numbers.
+fn kept(octree: &Octree) -> impl Iterator<Item = (usize, &Brick)> {
+    octree.whole().filter(|(_, brick)| brick.tabulated)
 }
 
 /// Neighbours along an axis, from -2 to 2 bricks away, and the places that a node has in them.
 type Candidates = Vec<(usize, usize)>;
 
 impl Splines {
-    /// Bytes of the splines of so many bricks and channels.
-    pub fn bytes_for(reach: usize, bricks: usize, channels: usize) -> u64 {
-        (8 * per_brick(reach) as u64 * channels as u64).saturating_mul(bricks as u64)
+    /// Bytes that are needed while splines are made of so many bricks.
+    pub fn bytes_for(reach: usize, bricks: usize) -> u64 {
+        (2 * 8 * per_brick(reach) as u64).saturating_mul(bricks as u64)
     }
 
-    /// Coefficients: entry `(slot * channels + channel) * per_brick + x + stride (y + edge z)`.
-    pub fn numbers(&self) -> &[f64] {
-        bytemuck::cast_slice(&self.lines)
-    }
-
-    /// The splines of combinations of a table's functions: channel c is Σ_k `weights[c][k]` times function k.
-    pub fn new(table: &PotentialTable, reach: usize, weights: &[Vec<f64>]) -> Self {
+    /// The splines of a combination of a table's functions, Σ_k `weights[k]` times function k, where `slots` are those of its
+    /// bricks.
+    pub fn new(table: &PotentialTable, reach: usize, slots: &[u32], weights: &[f64]) -> Self {
         let octree = &table.octree;
-        let kept: Vec<usize> = octree.whole().filter(|(_, brick)| brick.tabulated).map(|(n, _)| n).collect();
-        let mut slots = vec![NONE; octree.all().len()];
-        kept.iter().enumerate().for_each(|(slot, &n)| slots[n] = slot as u32);
-        let channels = weights.len();
-        let mut splines = Self { reach, channels, slots, lines: Vec::new() };
-        if channels == 0 {
-            return splines;
-        }
-        let nodes = combined(table, weights);
+        let kept: Vec<usize> = kept(octree).map(|(number, _)| number).collect();
         let per_brick = per_brick(reach);
-        let empty = || vec![Line::default(); kept.len() * channels * per_brick / 8];
-        let mut own = empty();
-        let numbers: &mut [f64] = bytemuck::cast_slice_mut(&mut own);
+        let mut own = vec![0.0; kept.len() * per_brick];
+        let nodes = combined(table, weights);
         let prefilter = prefilter(reach);
-        numbers.par_chunks_mut(channels * per_brick).zip(&kept).for_each(|(numbers, &number)| {
+        own.par_chunks_mut(per_brick).zip(&kept).for_each(|(numbers, &number)| {
             let brick = &octree.all()[number];
-            for (channel, numbers) in numbers.chunks_exact_mut(per_brick).enumerate() {
-                let corners: [&[f64]; 8] = std::array::from_fn(|c| {
-                    let first = (brick.corners[c] as usize * channels + channel) * PER_NODE;
-                    &nodes[first..first + PER_NODE]
-                });
-                let size = 0.5_f64.powi(i32::from(brick.level));
-                coefficients(&gather(&corners, size), &prefilter, reach, numbers);
-            }
+            let corners: [&[f64]; 8] = std::array::from_fn(|c| {
+                let first = brick.corners[c] as usize * PER_NODE;
+                &nodes[first..first + PER_NODE]
+            });
+            let size = 0.5_f64.powi(i32::from(brick.level));
+            coefficients(&gather(&corners, size), &prefilter, reach, numbers);
         });
         let candidates: Vec<(Candidates, Candidates)> = (0..edge(reach)).map(|i| candidates(reach, i)).collect();
-        let mut shared = empty();
-        let numbers: &mut [f64] = bytemuck::cast_slice_mut(&mut shared);
-        numbers.par_chunks_mut(channels * per_brick).zip(&kept).for_each(|(numbers, &number)| {
-            splines.share(octree, &octree.all()[number], bytemuck::cast_slice(&own), &candidates, numbers);
+        let mut splines = Self { reach, numbers: vec![0.0; own.len()] };
+        let steps = splines.steps();
+        splines.numbers.par_chunks_mut(per_brick).zip(&kept).for_each(|(numbers, &number)| {
+            let brick = &octree.all()[number];
+            let alike = |n: &usize| octree.all()[*n].level == brick.level;
+            let around = octree.around(brick, steps).into_iter();
+            let around: Vec<u32> = around.map(|n| n.filter(alike).map_or(NONE, |n| slots[n])).collect();
+            share(reach, &around, &own, &candidates, numbers);
         });
-        splines.lines = shared;
-        splines.follow_larger(octree, &kept);
+        splines.follow_larger(octree, slots, &kept);
         splines
-    }
-
-    /// Where a brick's coefficient of a channel is.
-    fn place(&self, slot: u32, channel: usize, [x, y, z]: [usize; 3]) -> usize {
-        (slot as usize * self.channels + channel) * per_brick(self.reach)
-            + x
-            + stride(self.reach) * (y + edge(self.reach) * z)
     }
 
     /// Neighbours in steps of bricks that a brick's coefficients depend on.
@@ -123,64 +109,25 @@ impl Splines {
         self.reach - 1
     }
 
-    /// The mean of what all bricks of one size have for a coefficient: of those that hold its node if there are any, else of
-    /// those beside it.
-    fn share(
-        &self,
-        octree: &Octree,
-        brick: &Brick,
-        own: &[f64],
-        candidates: &[(Candidates, Candidates)],
-        numbers: &mut [f64],
-    ) {
-        let around = octree.around(brick, self.steps());
-        let alike = |n: &usize| octree.all()[*n].level == brick.level;
-        let slots: Vec<u32> = around.iter().map(|n| n.filter(alike).map_or(NONE, |n| self.slots[n])).collect();
-        let (side, edge) = (2 * self.steps() + 1, edge(self.reach));
-        let mean = |of: [&Candidates; 3], channel: usize| {
-            let (mut sum, mut count) = (0.0, 0.0);
-            for (oz, k) in of[2] {
-                for (oy, j) in of[1] {
-                    for (ox, i) in of[0] {
-                        let slot = slots[ox + side * (oy + side * oz)];
-                        if slot != NONE {
-                            sum += own[self.place(slot, channel, [*i, *j, *k])];
-                            count += 1.0;
-                        }
-                    }
-                }
-            }
-            (count > 0.0).then(|| sum / count)
-        };
-        for at in (0..edge * edge * edge).map(|n| [n % edge, n / edge % edge, n / (edge * edge)]) {
-            for channel in 0..self.channels {
-                let value =
-                    mean(at.map(|i| &candidates[i].0), channel).or_else(|| mean(at.map(|i| &candidates[i].1), channel));
-                numbers[self.place(0, channel, at)] = value.unwrap_or(0.0);
-            }
-        }
-    }
-
     /// Coefficients that reach into larger bricks, from those of the larger ones: large bricks first.
-    fn follow_larger(&mut self, octree: &Octree, kept: &[usize]) {
+    fn follow_larger(&mut self, octree: &Octree, slots: &[u32], kept: &[usize]) {
         let levels = kept.iter().map(|n| octree.all()[*n].level).max().unwrap_or(0);
         for level in 1..=levels {
             let followed: Vec<(usize, f64)> = kept
                 .par_iter()
                 .filter(|n| octree.all()[**n].level == level)
-                .flat_map_iter(|&number| self.followed(octree, number))
+                .flat_map_iter(|&number| self.followed(octree, slots, number))
                 .collect();
-            let numbers: &mut [f64] = bytemuck::cast_slice_mut(&mut self.lines);
             for (place, value) in followed {
-                numbers[place] = value;
+                self.numbers[place] = value;
             }
         }
     }
 
     /// For one brick the places and values of coefficients that follow a larger brick.
-    fn followed(&self, octree: &Octree, number: usize) -> Vec<(usize, f64)> {
+    fn followed(&self, octree: &Octree, slots: &[u32], number: usize) -> Vec<(usize, f64)> {
         let brick = &octree.all()[number];
-        let is_larger = |n: &usize| octree.all()[*n].level < brick.level && self.slots[*n] != NONE;
+        let is_larger = |n: &usize| octree.all()[*n].level < brick.level && slots[*n] != NONE;
         let larger: Vec<Option<usize>> =
             octree.around(brick, self.steps()).into_iter().map(|n| n.filter(is_larger)).collect();
         let mut followed = Vec::new();
@@ -212,19 +159,47 @@ impl Splines {
                 let some = (0..4).filter(move |n| weights[*n] != 0.0);
                 some.map(move |n| ((first + n as i64) as usize, weights[n]))
             };
-            for channel in 0..self.channels {
-                let mut value = 0.0;
-                for (z, wz) in along(2) {
-                    for (y, wy) in along(1) {
-                        for (x, wx) in along(0) {
-                            value += wx * wy * wz * self.numbers()[self.place(self.slots[found], channel, [x, y, z])];
-                        }
+            let mut value = 0.0;
+            for (z, wz) in along(2) {
+                for (y, wy) in along(1) {
+                    for (x, wx) in along(0) {
+                        value += wx * wy * wz * self.numbers[place(self.reach, slots[found], [x, y, z])];
                     }
                 }
-                followed.push((self.place(self.slots[number], channel, at), value));
             }
+            followed.push((place(self.reach, slots[number], at), value));
         }
         followed
+    }
+}
+
+/// Where a brick's coefficient is.
+fn place(reach: usize, slot: u32, [x, y, z]: [usize; 3]) -> usize {
+    slot as usize * per_brick(reach) + x + stride(reach) * (y + edge(reach) * z)
+}
+
+/// The mean of what all bricks of one size have for a coefficient: of those that hold its node if there are any, else of those
+/// beside it. `around` are the slots of neighbours of the same size.
+fn share(reach: usize, around: &[u32], own: &[f64], candidates: &[(Candidates, Candidates)], numbers: &mut [f64]) {
+    let (side, edge) = (2 * (reach - 1) + 1, edge(reach));
+    let mean = |of: [&Candidates; 3]| {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (oz, k) in of[2] {
+            for (oy, j) in of[1] {
+                for (ox, i) in of[0] {
+                    let slot = around[ox + side * (oy + side * oz)];
+                    if slot != NONE {
+                        sum += own[place(reach, slot, [*i, *j, *k])];
+                        count += 1.0;
+                    }
+                }
+            }
+        }
+        (count > 0.0).then(|| sum / count)
+    };
+    for at in (0..edge * edge * edge).map(|n| [n % edge, n / edge % edge, n / (edge * edge)]) {
+        let value = mean(at.map(|i| &candidates[i].0)).or_else(|| mean(at.map(|i| &candidates[i].1)));
+        numbers[place(reach, 0, at)] = value.unwrap_or(0.0);
     }
 }
 
@@ -254,15 +229,13 @@ fn two_scale(reach: usize, node: i64) -> (i64, [f64; 4]) {
     }
 }
 
-/// What the nodes hold of combinations of functions: entry `(node * channels + channel) * 27 + derivative`.
-fn combined(table: &PotentialTable, weights: &[Vec<f64>]) -> Vec<f64> {
-    let per_node = table.channels * PER_NODE;
-    let mut nodes = vec![0.0; table.nodes.len() / per_node.max(1) * weights.len() * PER_NODE];
-    nodes.par_chunks_mut(weights.len() * PER_NODE).zip(table.nodes.par_chunks(per_node)).for_each(|(new, old)| {
-        for (new, row) in new.chunks_exact_mut(PER_NODE).zip(weights) {
-            for (old, w) in old.chunks_exact(PER_NODE).zip(row).filter(|(_, w)| **w != 0.0) {
-                new.iter_mut().zip(old).for_each(|(n, o)| *n += w * o);
-            }
+/// What the nodes hold of a combination of functions: entry `node * 27 + derivative`.
+fn combined(table: &PotentialTable, weights: &[f64]) -> Vec<f64> {
+    let per_node = (table.channels * PER_NODE).max(1);
+    let mut nodes = vec![0.0; table.nodes.len() / per_node * PER_NODE];
+    nodes.par_chunks_mut(PER_NODE).zip(table.nodes.par_chunks(per_node)).for_each(|(new, old)| {
+        for (old, w) in old.chunks_exact(PER_NODE).zip(weights).filter(|(_, w)| **w != 0.0) {
+            new.iter_mut().zip(old).for_each(|(n, o)| *n += w * o);
         }
     });
     nodes

@@ -10,11 +10,12 @@ use meshes::{SurfaceTree, Vec3};
 use rayon::prelude::*;
 
 use super::fill::fill;
+use super::kernel::Kernel;
 use super::measure::{TableReport, measure};
 use super::octree::{Brick, MAX_LEVEL, MOST_BRICKS, NONE, Octree};
 use super::refine::{Quality, quality, rescale};
-use super::spline::Splines;
-use super::{CELLS_PER_BRICK, Grid, PER_NODE, PotentialTable, reach_for};
+use super::spline::{CUBIC, QUINTIC};
+use super::{CELLS_PER_BRICK, Grid, PER_NODE, PotentialTable};
 use crate::{ElectrodeBasis, PanelSum, Plane};
 
 /// What is wanted of a table.
@@ -131,7 +132,7 @@ pub fn tabulate_around(
     let functions = basis.functions();
     let bytes = |spacing: f64| {
         let bricks = PotentialTable::bricks_for(options.min, options.max, spacing);
-        (bricks, PotentialTable::bytes_while_filling(&bricks, functions, options.is_smooth()))
+        (bricks, PotentialTable::bytes_while_filling(&bricks, functions, options.accuracy, options.smooth))
     };
     let (grid, needed) = bytes(spacing);
     if needed > options.max_bytes {
@@ -276,7 +277,7 @@ impl Maker<'_> {
         if !brick.is_filled() {
             return Vec::new();
         }
-        let (n, reach) = (self.table.channels, reach_for(self.options.is_smooth()));
+        let (n, reach) = (self.table.channels, if self.options.is_smooth() { QUINTIC } else { CUBIC });
         let of = |node: u32, c: usize| {
             let first = (node as usize * n + c) * PER_NODE;
             &self.table.nodes[first..first + PER_NODE]
@@ -378,7 +379,7 @@ impl Maker<'_> {
             let n = self.table.channels;
             let bricks = self.table.octree.all().len() + 8 * all.len();
             let bytes = (8 * PER_NODE * n * nodes) as u64 / 3 * 4
-                + Splines::bytes_for(reach_for(self.options.is_smooth()), bricks, n);
+                + Kernel::bytes_for(self.options.accuracy, self.options.is_smooth(), bricks, n);
             if nodes <= most_nodes && bytes <= self.options.max_bytes {
                 for number in all {
                     self.table.octree.halve(number);

@@ -31,11 +31,12 @@ fn random() -> impl FnMut() -> f64 {
     }
 }
 
-/// Accuracies that make splines cubic, and of degree five.
-const ACCURACIES: [f64; 2] = [1e-3, 1e-6];
+/// Accuracies that make splines cubic, and of degree five, both in double precision; and cubic in single precision.
+const ACCURACIES: [f64; 2] = [5e-5, 1e-6];
+const ROUNDED: f64 = 1e-3;
 
 fn kernel(table: &PotentialTable, weights: &[Vec<f64>]) -> Kernel {
-    Kernel::new(&table.octree, Splines::new(table, reach_for(table.smooth), weights))
+    Kernel::new(table, weights)
 }
 
 /// Potential and gradient of all channels.
@@ -129,9 +130,32 @@ fn check_faces(accuracy: f64) {
     assert!(different > 50, "{different}");
 }
 
+/// Potentials and fields of both precisions at random points of bricks of three sizes: their largest differences, and the largest
+/// field.
+#[test]
+fn single_precision_is_enough() {
+    let [rounded, double] = [ROUNDED, ACCURACIES[0]].map(|accuracy| {
+        let table = PotentialTable::of_bricks(mixed(), 2, accuracy, derivatives);
+        kernel(&table, &[vec![1.0, 0.0], vec![0.0, 1.0]])
+    });
+    assert!(2 * rounded.bytes() < double.bytes() * 11 / 10);
+    let mut next = random();
+    let points: Vec<Vec3> = (0..2000).map(|_| Vec3::from_fn(|_, _| 2.0 * next() - 1.0)).collect();
+    let ((potential, gradient), (exact, exact_gradient)) = (at(&rounded, &points), at(&double, &points));
+    let off = potential.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let field_off = gradient.iter().zip(&exact_gradient).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    // Within 0.2 of the middle of the largest bricks, the potential of the second channel leaves its plane by less than
+    // 2 · 4.1 · 0.2² · 3/2 = 0.5. Weights of splines add up to 1, and those of their slopes to 1.5 per cell along each axis.
+    let rounding = 0.5 * f64::from(f32::EPSILON) / 2.0;
+    assert!(off > 0.0 && off < rounding, "{off:e} {rounding:e}");
+    assert!(field_off < 1.5 * 3.0_f64.sqrt() * rounding / 0.1, "{field_off:e}");
+    let strongest = exact_gradient.iter().map(|g| g.norm()).fold(0.0, f64::max);
+    assert!(field_off < 1e-3 * kernel::SINGLE * strongest, "{field_off:e} of {strongest}");
+}
+
 #[test]
 fn sums_of_channels_are_sums() {
-    for accuracy in ACCURACIES {
+    for accuracy in [ROUNDED, ACCURACIES[0], ACCURACIES[1]] {
         check_sums(accuracy);
     }
 }
