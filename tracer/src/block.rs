@@ -113,14 +113,9 @@ impl<'a> Block<'a> {
         motion.acceleration + self.linear[lane].acceleration(&motion.velocity)
     }
 
-    /// What a step that ends there may err in position (m) and velocity (m/s): the tolerance relative to the way that the grain has
-    /// come so far and to its highest speed.
-    pub fn allowed(&self, lane: usize, position: &Vec3, velocity: &Vec3) -> [f64; 2] {
-        let state = &self.state[lane];
-        let moved = (position - state.motion.position).norm().max((position - state.origin).norm());
-        let length = state.travel.max(moved).max(self.least_travel);
-        let speed = state.top_speed.max(velocity.norm());
-        [(self.tolerance * length).max(4.0 * f64::EPSILON * position.amax()), self.tolerance * speed]
+    /// What steps are held to.
+    pub fn limits(&self) -> Limits {
+        Limits { tolerance: self.tolerance, least_travel: self.least_travel }
     }
 
     /// Keeps the grains for which `keep` is true, in their order.
@@ -133,6 +128,24 @@ impl<'a> Block<'a> {
         retain(&mut self.thermal, keep);
         retain(&mut self.state, keep);
         retain(&mut self.trial, keep);
+    }
+}
+
+/// What steps are held to.
+#[derive(Clone, Copy)]
+pub(crate) struct Limits {
+    tolerance: f64,
+    least_travel: f64,
+}
+
+impl Limits {
+    /// What a step that ends there may err in position (m) and velocity (m/s): the tolerance relative to the way that the grain has
+    /// come so far and to its highest speed.
+    pub fn allowed(&self, state: &State, position: &Vec3, velocity: &Vec3) -> [f64; 2] {
+        let moved = (position - state.motion.position).norm().max((position - state.origin).norm());
+        let length = state.travel.max(moved).max(self.least_travel);
+        let speed = state.top_speed.max(velocity.norm());
+        [(self.tolerance * length).max(4.0 * f64::EPSILON * position.amax()), self.tolerance * speed]
     }
 }
 

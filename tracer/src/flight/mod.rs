@@ -303,16 +303,14 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
         }
         self.sample(&good);
         self.take_samples();
-        for lane in (0..n).filter(|&lane| good[lane]) {
-            self.commit(lane);
-        }
+        self.commit_all(&good);
         self.finish();
         Ok(())
     }
 
     fn is_good(&self, lane: usize) -> bool {
-        let trial = &self.block.trial[lane];
-        trial.error <= 1.0 && self.is_finite(lane)
+        // Shared errors are infinite where anything is.
+        self.block.trial[lane].error <= 1.0 && (self.run.shared || self.is_finite(lane))
     }
 
     fn is_finite(&self, lane: usize) -> bool {
@@ -514,18 +512,28 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
         self.find_paths(&good);
         self.sample(&good);
         self.take_samples();
-        for lane in 0..self.lanes.len() {
-            self.commit(lane);
-        }
+        self.commit_all(&good);
         self.finish();
     }
 
-    /// Makes the end of the step the new state.
-    fn commit(&mut self, lane: usize) {
+    /// Makes the ends of good steps the new states.
+    fn commit_all(&mut self, good: &[bool]) {
+        // Errors that are shared make the same of all steps.
+        let first = self.block.trial.first().filter(|_| self.run.shared && self.nature.adaptive);
+        let shared = first.map(|trial| grow(trial.error));
+        let mut flown = 0.0;
+        for lane in (0..self.lanes.len()).filter(|&lane| good[lane]) {
+            flown += self.block.trial[lane].end - self.block.state[lane].time;
+            self.commit(lane, shared);
+        }
+        self.run.meter.add(flown);
+    }
+
+    /// Makes the end of the step the new state; `growth` of the step is known where errors are shared.
+    fn commit(&mut self, lane: usize, growth: Option<f64>) {
         self.result.counts.accepted += self.block.trial[lane].steps;
         let (run, trial) = (self.run, self.block.trial[lane]);
         let (state, l) = (&mut self.block.state[lane], &mut self.lanes[lane]);
-        run.meter.add(trial.end - state.time);
         state.time = trial.end;
         state.motion = trial.motion;
         state.fresh = trial.fresh;
@@ -534,7 +542,8 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
         if self.nature.adaptive {
             state.travel = state.travel.max((trial.motion.position - state.origin).norm());
             state.top_speed = state.top_speed.max(trial.motion.velocity.norm());
-            let factor = if l.pace.rejected { grow(trial.error).min(1.0) } else { grow(trial.error) };
+            let growth = growth.unwrap_or_else(|| grow(trial.error));
+            let factor = if l.pace.rejected { growth.min(1.0) } else { growth };
             // A step cut short by a stop says nothing against the longer one that was wanted.
             let cut = factor >= 1.0 && trial.step < 0.99 * l.pace.wanted.min(run.max_step);
             l.pace.wanted = if cut { l.pace.wanted.max(trial.step * factor) } else { trial.step * factor };

@@ -66,7 +66,7 @@ impl Force for Coulomb {
             }
             return;
         }
-        pairs::field(batch, &mut scratch.numbers, |i, field| force[i] += field * (COULOMB * batch.charge[i]));
+        pairs::forces(batch, &mut scratch.numbers, |i, own| force[i] += own * COULOMB);
     }
 
     fn add_energy(&self, batch: &Batch, _: &mut Scratch, energy: &mut [f64]) {

@@ -151,7 +151,7 @@ impl Integrator for Dop853 {
         // `sum` still holds the weighted sum of the solution.
         for lane in 0..n {
             let (r, v) = (self.stage.position[lane], self.stage.velocity[lane]);
-            let allowed = block.allowed(lane, &r, &v);
+            let allowed = block.limits().allowed(&block.state[lane], &r, &v);
             let (state, trial) = (&block.state[lane], &mut block.trial[lane]);
             let h = trial.step;
             trial.motion = Motion { position: r, velocity: v, acceleration: self.acceleration[lane] };

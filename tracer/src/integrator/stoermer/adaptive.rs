@@ -161,10 +161,7 @@ impl AdaptiveStoermer {
             return;
         }
         self.multiple = true;
-        self.past.advance(block);
-        for lane in 0..block.len() {
-            block.trial[lane].error = self.past.error(block, lane);
-        }
+        self.past.advance(block, true);
         let error = worst(block);
         let sum = even.sum.saturating_add(u32::from(error <= 1.0));
         let even = Even { sum, ..even };

@@ -50,7 +50,7 @@ impl Integrator for Stoermer {
         let step = trial.step;
         self.past.note(block, step);
         if self.past.suffices() {
-            self.past.advance(block);
+            self.past.advance(block, false);
         } else {
             self.starter.advance(block);
         }

@@ -2,6 +2,7 @@
 
 use meshes::Vec3;
 use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
 
 use super::weights::{TERMS, Weights};
 use crate::block::{Block, retain};
@@ -12,6 +13,9 @@ pub(super) const KEPT: usize = 16;
 
 /// Numbers handled at a time; lists are filled up to a multiple of it.
 const WIDTH: usize = 8;
+
+/// Grains that a thread takes at least: ten microseconds of work.
+const PART: usize = 256;
 
 /// Accelerations of the last steps, all of the same length, and the chord of the last one.
 ///
@@ -108,12 +112,14 @@ impl Past {
         if !again || self.filled == 0 {
             self.carry();
             self.history.rotate_right(1);
-            for (lane, state) in block.state.iter().enumerate() {
-                let half = 0.5 * block.linear[lane].rate;
-                let whole = state.motion.acceleration + state.motion.position * (half * half);
-                put(&mut self.history[0], lane, &whole);
-                put(&mut self.now, lane, &state.motion.position);
-            }
+            let lists = self.history[0].par_chunks_mut(3).zip(self.now.par_chunks_mut(3));
+            lists.zip(&block.state).zip(&block.linear).with_min_len(PART).for_each(
+                |(((whole, now), state), linear)| {
+                    let (half, motion) = (0.5 * linear.rate, &state.motion);
+                    whole.copy_from_slice((motion.acceleration + motion.position * (half * half)).as_slice());
+                    now.copy_from_slice(motion.position.as_slice());
+                },
+            );
             self.filled = (self.filled + 1).min(KEPT);
             self.newest = time;
         }
@@ -166,8 +172,8 @@ impl Past {
         self.chord_known = true;
     }
 
-    /// Tries a step from what was noted.
-    pub fn advance(&mut self, block: &mut Block) {
+    /// Tries a step from what was noted, and estimates its error if that is wanted.
+    pub fn advance(&mut self, block: &mut Block, estimate: bool) {
         let h = self.step;
         let Self { weights, history, chord, next, now, place, speed, rough, decay, .. } = self;
         self.arch.dispatch(Sums { weights, h2: h * h, history, now, chord, decay, next, place, speed, rough });
@@ -180,41 +186,41 @@ impl Past {
             self.velocity.push(state.motion.velocity);
         }
         block.forces.accelerations(&self.time, &self.position, &self.velocity, &mut self.acceleration);
-        for lane in 0..block.len() {
-            let half = 0.5 * block.linear[lane].rate;
-            let (r, a) = (self.position[lane], self.acceleration[lane]);
+        let (past, limits, watched) = (&*self, block.limits(), block.watched);
+        let lanes = block.trial.par_iter_mut().zip(&block.state).zip(&block.linear).enumerate();
+        lanes.with_min_len(PART).for_each(|(lane, ((trial, state), linear))| {
+            let half = 0.5 * linear.rate;
+            let (r, a) = (past.position[lane], past.acceleration[lane]);
             // `speed` holds the sum without the newest.
-            let chord = vector(&self.next, lane);
-            let sum = vector(&self.speed, lane) + (a + r * (half * half)) * (self.weights.speed[0] * h * h);
-            let trial = &mut block.trial[lane];
+            let (chord, newest) = (vector(&past.next, lane), a + r * (half * half));
+            let sum = vector(&past.speed, lane) + newest * (past.weights.speed[0] * h * h);
             trial.motion.position = r;
             trial.motion.velocity = (chord + sum) / h - r * half;
             trial.motion.acceleration = a;
             trial.fresh = true;
             trial.reach = 0.0;
-            if block.watched {
-                let state = &block.state[lane].motion;
+            if watched {
+                let state = &state.motion;
                 let fastest = state.velocity.norm_squared().max(trial.motion.velocity.norm_squared()).sqrt();
                 let strongest = state.acceleration.norm_squared().max(a.norm_squared()).sqrt();
                 trial.reach = h * (fastest + h * strongest);
             }
-        }
+            if estimate {
+                trial.error = past.error(lane, &newest, limits.allowed(state, &r, &trial.motion.velocity));
+            }
+        });
     }
 
     /// Error of the step just tried for one grain, over what is allowed: what the first difference left out adds to the chord, as
-    /// a velocity and as a position, root mean square of the two.
-    pub fn error(&self, block: &Block, lane: usize) -> f64 {
+    /// a velocity and as a position, root mean square of the two. `newest` is the acceleration found for its end.
+    fn error(&self, lane: usize, newest: &Vec3, [length, speed]: [f64; 2]) -> f64 {
         /// ∇¹² is a sum of numbers up to 924, of which 4096 in all: so much of it may be rounding, in parts of the acceleration.
         const ROUNDING: f64 = 4096.0 * f64::EPSILON;
         /// Errors of a multistep last: so much more care leaves what `Dop853` leaves at the same tolerance (clouds in a Paul trap).
         const CAUTION: f64 = 3.0;
-        let half = 0.5 * block.linear[lane].rate;
-        let trial = &block.trial[lane].motion;
-        let newest = trial.acceleration + trial.position * (half * half);
         let difference = (vector(&self.rough, lane) + newest).norm();
         let rounding = ROUNDING * newest.norm().max(vector(&self.history[0], lane).norm());
         let missing = CAUTION * self.step * self.weights.missing * (difference - rounding).max(0.0);
-        let [length, speed] = block.allowed(lane, &trial.position, &trial.velocity);
         // A grain that has never moved has no scale, and no error.
         let part = |error: f64, allowed: f64| if allowed > 0.0 { (error / allowed).powi(2) } else { 0.0 };
         (0.5 * (part(missing * self.step, length) + part(missing, speed))).sqrt()
