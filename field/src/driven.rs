@@ -3,16 +3,8 @@
 use std::sync::Arc;
 
 use meshes::Vec3;
-use rayon::prelude::*;
 
 use crate::{BasisField, Samples, Waveform};
-
-/// Points from which on threads share them: a table takes some 50 microseconds for so many. Blocks of grains that do not feel each
-/// other are smaller, and fly side by side.
-const WORTH_SHARING: usize = 512;
-
-/// Points of a part.
-const PART: usize = 128;
 
 /// A basis with a waveform on each channel.
 #[derive(Clone)]
@@ -63,16 +55,7 @@ impl DrivenField {
                 volts.extend(self.waveforms.iter().map(|w| w.value(times[p])));
             }
         }
-        if channels > 0 && points.len() >= WORTH_SHARING {
-            let all = points.par_chunks(PART).zip(volts.par_chunks(PART * channels));
-            all.zip(potential.par_chunks_mut(PART).zip(field.par_chunks_mut(PART))).for_each(
-                |((points, volts), (potential, field))| {
-                    self.basis.sum(points, volts, &mut Samples::default(), potential, field);
-                },
-            );
-        } else {
-            self.basis.sum(points, &volts, scratch, potential, field);
-        }
+        self.basis.sum(points, &volts, scratch, potential, field);
         scratch.factors = volts;
         field.iter_mut().for_each(|e| *e = -*e);
     }

@@ -1,9 +1,11 @@
 //! Everything that acts on grains and ends their flights.
 
+use std::ops::AddAssign;
 use std::sync::Arc;
 
 use field::DrivenField;
 use meshes::{SurfaceTree, Vec3};
+use rayon::prelude::*;
 
 use crate::constants::BOLTZMANN;
 use crate::force::linear_form::LinearForm;
@@ -16,7 +18,7 @@ use crate::{ConstantForce, Coulomb, Drag, DragError, Electric, Event, Gravity, R
 /// Drag and magnetic field stand apart from the other forces, because integrators that split know their exact flow.
 #[derive(Clone, Default)]
 pub struct System {
-    /// Added up in this order.
+    /// Added up in this order, those that couple grains after all others.
     pub forces: Vec<Arc<dyn Force>>,
     /// Drag in proportion to the speed.
     pub drag: Option<Drag>,
@@ -161,7 +163,7 @@ impl System {
         self.each(batch, scratch, energy, 0.0, |f, b, s, out| f.add_energy(b, s, out));
     }
 
-    fn each<T: Send + Copy>(
+    fn each<T: Send + Copy + AddAssign>(
         &self,
         batch: &Batch,
         scratch: &mut Scratch,
@@ -171,18 +173,29 @@ impl System {
     ) {
         /// Grains of one part: what a block of independent grains has at most, and enough to be worth a task.
         const PART: usize = 64;
+        let all = |couples: bool| {
+            let forces = self.forces.iter().map(Arc::as_ref);
+            forces.filter(move |force| force.nature().couples_grains == couples)
+        };
         out.fill(zero);
-        for force in &self.forces {
-            let force = force.as_ref();
-            if batch.len() <= 2 * PART || force.nature().couples_grains {
-                add(force, batch, scratch, out);
-            } else {
-                use rayon::prelude::*;
-                out.par_chunks_mut(PART).enumerate().for_each_init(Scratch::default, |scratch, (k, out)| {
-                    let range = k * PART..k * PART + out.len();
-                    add(force, &batch.part(range), scratch, out);
-                });
-            }
+        if batch.len() <= 2 * PART {
+            all(false).chain(all(true)).for_each(|force| add(force, batch, scratch, out));
+            return;
         }
+        let single = |out: &mut [T]| {
+            out.par_chunks_mut(PART).enumerate().for_each_init(Scratch::default, |scratch, (k, out)| {
+                let part = batch.part(k * PART..k * PART + out.len());
+                all(false).for_each(|force| add(force, &part, scratch, out));
+            });
+        };
+        if all(true).next().is_none() {
+            single(out);
+            return;
+        }
+        // Side by side: threads that are done with one kind help with the other.
+        let mut coupled = vec![zero; out.len()];
+        let both = &mut coupled[..];
+        rayon::join(|| all(true).for_each(|force| add(force, batch, scratch, both)), || single(out));
+        out.iter_mut().zip(coupled).for_each(|(out, own)| *out += own);
     }
 }

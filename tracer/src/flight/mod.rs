@@ -11,7 +11,7 @@ use self::lane::{Fate, Grid, Kind, Lane};
 use self::log::Log;
 use self::sampling::Point;
 
-use crate::block::{Block, State, retain};
+use crate::block::{Block, State, Trial, retain};
 use crate::checkpoint::{Counts, Landed};
 use crate::event::first_event;
 use crate::force::linear_form::LinearForm;
@@ -221,8 +221,10 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
     fn plan(&mut self) {
         for lane in 0..self.lanes.len() {
             if self.run.shared && lane > 0 {
-                let first = self.block.trial[0];
-                self.block.trial[lane] = first;
+                let Trial { step, end, number, steps, first, room, longest, error, .. } = self.block.trial[0];
+                let trial = &mut self.block.trial[lane];
+                (trial.step, trial.end, trial.number, trial.error) = (step, end, number, error);
+                (trial.steps, trial.first, trial.room, trial.longest) = (steps, first, room, longest);
                 continue;
             }
             let state = &self.block.state[lane];
@@ -520,42 +522,17 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
     fn commit_all(&mut self, good: &[bool]) {
         // Errors that are shared make the same of all steps.
         let first = self.block.trial.first().filter(|_| self.run.shared && self.nature.adaptive);
-        let shared = first.map(|trial| grow(trial.error));
+        let growth = first.map(|trial| grow(trial.error));
         let mut flown = 0.0;
-        for lane in (0..self.lanes.len()).filter(|&lane| good[lane]) {
-            flown += self.block.trial[lane].end - self.block.state[lane].time;
-            self.commit(lane, shared);
+        for ((trial, state), _) in self.block.trial.iter().zip(&self.block.state).zip(good).filter(|(_, good)| **good) {
+            self.result.counts.accepted += trial.steps;
+            flown += trial.end - state.time;
         }
         self.run.meter.add(flown);
-    }
-
-    /// Makes the end of the step the new state; `growth` of the step is known where errors are shared.
-    fn commit(&mut self, lane: usize, growth: Option<f64>) {
-        self.result.counts.accepted += self.block.trial[lane].steps;
-        let (run, trial) = (self.run, self.block.trial[lane]);
-        let (state, l) = (&mut self.block.state[lane], &mut self.lanes[lane]);
-        state.time = trial.end;
-        state.motion = trial.motion;
-        state.fresh = trial.fresh;
-        l.pace.number += trial.steps;
-        l.pace.grid.taken = (l.pace.grid.taken + trial.steps).min(l.pace.grid.count);
-        if self.nature.adaptive {
-            state.travel = state.travel.max((trial.motion.position - state.origin).norm());
-            state.top_speed = state.top_speed.max(trial.motion.velocity.norm());
-            let growth = growth.unwrap_or_else(|| grow(trial.error));
-            let factor = if l.pace.rejected { growth.min(1.0) } else { growth };
-            // A step cut short by a stop says nothing against the longer one that was wanted.
-            let cut = factor >= 1.0 && trial.step < 0.99 * l.pace.wanted.min(run.max_step);
-            l.pace.wanted = if cut { l.pace.wanted.max(trial.step * factor) } else { trial.step * factor };
-            l.pace.rejected = false;
-        }
-        if trial.end >= l.pace.corner {
-            state.fresh = false;
+        let lanes = self.lanes.iter_mut().zip(&mut self.block.state).zip(&self.block.trial).zip(good);
+        for (((lane, state), trial), _) in lanes.filter(|(_, good)| **good) {
             let margin = self.block.forces.margin(trial.end, trial.end);
-            l.pace.corner = run.system.next_corner(trial.end + 2.0 * margin);
-        }
-        if l.fate.is_none() && trial.end >= run.options.end() {
-            l.fate = Some(Fate::here(trial.end, &trial.motion, Kind::TimeUp));
+            self.run.commit(self.nature.adaptive, lane, state, trial, growth, margin);
         }
     }
 
@@ -604,6 +581,41 @@ impl<'a, 'b, I: Integrator> Loop<'a, 'b, I> {
 }
 
 impl Run<'_> {
+    /// Makes the end of a step the new state; `growth` of the step is known where errors are shared.
+    fn commit(
+        &self,
+        adaptive: bool,
+        lane: &mut Lane,
+        state: &mut State,
+        trial: &Trial,
+        growth: Option<f64>,
+        margin: f64,
+    ) {
+        state.time = trial.end;
+        state.motion = trial.motion;
+        state.fresh = trial.fresh;
+        let pace = &mut lane.pace;
+        pace.number += trial.steps;
+        pace.grid.taken = (pace.grid.taken + trial.steps).min(pace.grid.count);
+        if adaptive {
+            state.travel = state.travel.max((trial.motion.position - state.origin).norm());
+            state.top_speed = state.top_speed.max(trial.motion.velocity.norm());
+            let growth = growth.unwrap_or_else(|| grow(trial.error));
+            let factor = if pace.rejected { growth.min(1.0) } else { growth };
+            // A step cut short by a stop says nothing against the longer one that was wanted.
+            let cut = factor >= 1.0 && trial.step < 0.99 * pace.wanted.min(self.max_step);
+            pace.wanted = if cut { pace.wanted.max(trial.step * factor) } else { trial.step * factor };
+            pace.rejected = false;
+        }
+        if trial.end >= pace.corner {
+            state.fresh = false;
+            pace.corner = self.system.next_corner(trial.end + 2.0 * margin);
+        }
+        if lane.fate.is_none() && trial.end >= self.options.end() {
+            lane.fate = Some(Fate::here(trial.end, &trial.motion, Kind::TimeUp));
+        }
+    }
+
     /// First step to try, s: a hundredth of the shortest time that the grain itself shows. The error control makes it
     /// grow sixfold a step, so a short one costs little.
     fn first_step(&self, state: &State, linear: &Linear) -> f64 {

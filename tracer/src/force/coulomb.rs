@@ -4,7 +4,6 @@ use faer::Mat;
 use field::constants::COULOMB;
 use field::multipole::Points;
 use meshes::Vec3;
-use rayon::prelude::*;
 
 use super::{Batch, Force, Nature, Scratch, pairs};
 
@@ -69,22 +68,17 @@ impl Force for Coulomb {
         pairs::forces(batch, &mut scratch.numbers, |i, own| force[i] += own * COULOMB);
     }
 
-    fn add_energy(&self, batch: &Batch, _: &mut Scratch, energy: &mut [f64]) {
+    fn add_energy(&self, batch: &Batch, scratch: &mut Scratch, energy: &mut [f64]) {
         if let Some(potential) = self.far(batch, false) {
             for (i, w) in energy.iter_mut().enumerate() {
                 *w += 0.5 * COULOMB * batch.charge[i] * potential[(i, 0)];
             }
             return;
         }
-        energy.par_iter_mut().enumerate().for_each(|(i, w)| {
-            let mut sum = 0.0;
-            for (j, (r, q)) in batch.position.iter().zip(batch.charge).enumerate() {
-                if j != i {
-                    sum += q / (batch.position[i] - r).norm();
-                }
-            }
-            *w += 0.5 * COULOMB * batch.charge[i] * sum;
-        });
+        let potential = pairs::potentials(batch, &mut scratch.numbers);
+        for ((w, potential), charge) in energy.iter_mut().zip(potential).zip(batch.charge) {
+            *w += 0.5 * COULOMB * charge * potential;
+        }
     }
 }
 

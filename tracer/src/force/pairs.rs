@@ -39,7 +39,7 @@ pub(super) fn forces(batch: &Batch, memory: &mut Vec<f64>, mut add: impl FnMut(u
     let mut parts: Vec<Sums> = if grains.count * grains.count < WORTH_SHARING {
         (0..stripes.count).map(one).collect()
     } else {
-        (0..stripes.count).into_par_iter().map(one).collect()
+        (0..stripes.count).into_par_iter().with_max_len(1).map(one).collect()
     };
     let Some((all, others)) = parts.split_first_mut() else { return };
     for other in others {
@@ -48,6 +48,44 @@ pub(super) fn forces(batch: &Batch, memory: &mut Vec<f64>, mut add: impl FnMut(u
     let [x, y, z] = all.parts();
     for i in 0..grains.count {
         add(i, Vec3::new(x[i], y[i], z[i]));
+    }
+}
+
+/// Σ_j Q_j / |r_i - r_j| at every grain i of a batch, C/m; `memory` is scratch.
+///
+/// Every pair twice, as energies are asked for at samples only. Checked by `forces_of_a_cloud_add_up_to_nothing_and_follow_the_energy`.
+pub(super) fn potentials(batch: &Batch, memory: &mut Vec<f64>) -> Vec<f64> {
+    let (arch, grains) = (Arch::new(), Grains::new(batch, memory));
+    let one = |target| arch.dispatch(Potential { grains: &grains, target });
+    (0..grains.count).into_par_iter().with_min_len(TILE).map(one).collect()
+}
+
+/// The potential at a grain by all others.
+struct Potential<'a> {
+    grains: &'a Grains<'a>,
+    target: usize,
+}
+
+impl WithSimd for Potential<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> f64 {
+        let Self { grains: g, target } = self;
+        let (x, _) = S::as_simd_f64s(g.x);
+        let (y, _) = S::as_simd_f64s(g.y);
+        let (z, _) = S::as_simd_f64s(g.z);
+        let (charge, _) = S::as_simd_f64s(g.charge);
+        let (number, _) = S::as_simd_f64s(g.number);
+        let (tx, ty, tz) = (simd.splat_f64s(g.x[target]), simd.splat_f64s(g.y[target]), simd.splat_f64s(g.z[target]));
+        let (zero, own) = (simd.splat_f64s(0.0), simd.splat_f64s(target as f64));
+        let mut sum = zero;
+        for v in 0..x.len() {
+            let (dx, dy, dz) = (simd.sub_f64s(x[v], tx), simd.sub_f64s(y[v], ty), simd.sub_f64s(z[v], tz));
+            let part = simd.div_f64s(charge[v], simd.sqrt_f64s(square(simd, dx, dy, dz)));
+            sum = simd.add_f64s(sum, simd.select_f64s(simd.equal_f64s(number[v], own), zero, part));
+        }
+        simd.reduce_sum_f64s(sum)
     }
 }
 
