@@ -145,7 +145,8 @@ fn exact_table_of_a_grid_plate_has_small_cells_where_they_count() {
         left(&uniform)
     );
     assert!(report.error() <= 1e-3 && a < 1e-3, "{a:e}, {report:?}");
-    assert!(report.finest_spacing < 0.6 * report.spacing && report.jump < 1e-12, "{report:?}");
+    // Bricks round on their own, in single precision at this accuracy: less than the whole unit beside their planes.
+    assert!(report.finest_spacing < 0.6 * report.spacing && report.jump < 2.0_f64.powi(-24), "{report:?}");
     // As many nodes: better where both are, and less is left to the exact sum.
     assert!(b > 2.0 * a && left(&uniform) > left(&small), "{a:e} {b:e}, {} {}", left(&small), left(&uniform));
 }

@@ -1,5 +1,5 @@
-//! Evaluating splines at points, fast: points are found and their splines weighed four at a time, in the lanes of vectors; what they
-//! need of a brick is then added up for each, row by row.
+//! Evaluating splines at points, fast: points are found and their splines weighed four at a time, in the lanes of vectors; what
+//! they need of a brick is then added up for each, row by row.
 
 use meshes::Vec3;
 #[cfg(target_arch = "x86_64")]

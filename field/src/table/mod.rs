@@ -5,7 +5,8 @@
 //! extrapolated. How small bricks must be and how thick that layer follows from the error, measured at points between the nodes.
 //!
 //! A [`PotentialTable`] holds the derivatives of the basis functions at the corners of bricks; it is what is kept in files. A
-//! [`TabulatedField`] holds splines of the channels that follow from it; it is what grains fly in.
+//! [`TabulatedField`] holds splines of the channels that follow from it, in single precision where that rounds off less than a
+//! thousandth of the accuracy; it is what grains fly in.
 
 mod bspline;
 mod fill;

@@ -31,7 +31,7 @@ pub struct Coulomb {
 }
 
 /// Grains above which the multipole method takes less time than all pairs: on one core 1.5 µs a grain at 1e-4 and 3.3 at 1e-6,
-/// against 0.85 ns a pair.
+/// against 0.5 ns a pair.
 pub const MANY: usize = 4000;
 
 /// The multipole method is asked for so much of the accuracy: its errors are estimates for even clouds, and reach 1.1 of what is

@@ -53,7 +53,8 @@ pub(super) fn forces(batch: &Batch, memory: &mut Vec<f64>, mut add: impl FnMut(u
 
 /// Σ_j Q_j / |r_i - r_j| at every grain i of a batch, C/m; `memory` is scratch.
 ///
-/// Every pair twice, as energies are asked for at samples only. Checked by `forces_of_a_cloud_add_up_to_nothing_and_follow_the_energy`.
+/// Every pair twice, as energies are asked for at samples only. Checked by
+/// `forces_of_a_cloud_add_up_to_nothing_and_follow_the_energy`.
 pub(super) fn potentials(batch: &Batch, memory: &mut Vec<f64>) -> Vec<f64> {
     let (arch, grains) = (Arch::new(), Grains::new(batch, memory));
     let one = |target| arch.dispatch(Potential { grains: &grains, target });
@@ -368,8 +369,8 @@ impl<S: Simd> InverseCube<S> for Divided {
 }
 
 /// From the inverse root that the machine knows to 2⁻¹⁴: with 1 - d² y² = h, |h| < 1.3e-4, the rest is the binomial series
-/// d⁻³ = y³ (1 - h)^(-3/2) = y³ (1 + 3/2 h + 15/8 h² + 35/16 h³ + 315/128 h⁴ + ...), where the next term is below 1e-19. A root
-/// and a division take three times as long.
+/// d⁻³ = y³ (1 - h)^(-3/2) = y³ (1 + 3/2 h + 15/8 h² + 35/16 h³ + 315/128 h⁴ + ...), where the next term is below 1e-19.
+/// The whole sum takes a fifth less than with a root and a division.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
 struct Refined;

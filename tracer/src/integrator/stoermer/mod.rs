@@ -18,7 +18,8 @@ use crate::path::Path;
 ///   d' = d + h² Σ_j σ_j a_j,   r' = r + d',   h v' = d' + h² Σ_j c_j a_j
 ///
 /// d the chord of the last step, kept apart, so that rounding of r does not spoil it; σ_j weights of the acceleration j steps
-/// before the start, c_j before the end, both exact for accelerations that are polynomials of degree 11 in time. With drag γ the scheme holds for e^(γt/2) r, whose acceleration has (γ/2)² r added to it.
+/// before the start, c_j before the end, both exact for accelerations that are polynomials of degree 11 in time. With drag γ the scheme
+/// holds for e^(γt/2) r, whose acceleration has (γ/2)² r added to it.
 /// The first eleven steps, and those after a corner of a waveform or another length of step, are done by `BlanesMoan14`.
 ///
 /// In a Paul trap 1e-6 after 1000 periods takes 32 to 36 forces a period, where `BlanesMoan14` takes 112 to 140. Not symplectic,
