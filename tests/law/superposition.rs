@@ -40,20 +40,29 @@ fn law_joined_electrodes_are_the_sum_of_their_solutions() {
 
 #[test]
 fn law_weighted_fields_are_weighted_sums_of_unit_fields() {
+    // Rounding of a sum over a thousand panels of charges of both signs; splines of single precision round more.
+    for (accuracy, rounding) in [(5e-5, 1e-12), (1e-3, 2.0_f64.powi(-24))] {
+        check_weighted_fields(accuracy, rounding);
+    }
+}
+
+/// With potentials of 100 V.
+fn check_weighted_fields(accuracy: f64, rounding: f64) {
     let mesh = ring_disc_sphere(300);
     let basis = BoundaryProblem::new(&mesh).solve().unwrap();
     let options = TableOptions {
         min: Vec3::repeat(-0.5),
         max: Vec3::repeat(0.5),
-        accuracy: 1e-3,
-        spacing: Some(0.1),
+        accuracy,
+        spacing: Some(0.05),
         max_bytes: 1 << 28,
         smooth: false,
     };
     let table = tabulate(&basis, &options, &|_| ()).unwrap().0;
     let identity: Vec<Vec<f64>> = (0..3).map(|k| (0..3).map(|l| f64::from(u8::from(k == l))).collect()).collect();
     let mut next = random(11);
-    let points: Vec<Vec3> = (0..300).map(|_| Vec3::from_fn(|_, _| 3.0 * next() - 1.5)).collect();
+    let points: Vec<Vec3> = (0..300).map(|_| Vec3::from_fn(|_, _| 1.5 * next() - 0.75)).collect();
+    assert!(points.iter().filter(|p| table.covers(p)).count() > 5, "the table is asked too");
     for _ in 0..5 {
         let weights = vec![(0..3).map(|_| 200.0 * next() - 100.0).collect::<Vec<f64>>()];
         let pairs: [(Box<dyn BasisField>, Box<dyn BasisField>); 2] = [
@@ -71,9 +80,8 @@ fn law_weighted_fields_are_weighted_sums_of_unit_fields() {
             for p in 0..points.len() {
                 let sum: f64 = (0..3).map(|k| weights[0][k] * units.potential[3 * p + k]).sum();
                 let slope: Vec3 = (0..3).map(|k| units.gradient[3 * p + k] * weights[0][k]).sum();
-                // Rounding of a sum over a thousand panels of charges of both signs, of 100 V.
-                assert!((got.potential[p] - sum).abs() < 1e-12 * 100.0, "{} {sum}", got.potential[p]);
-                assert!((got.gradient[p] - slope).norm() < 1e-12 * strongest, "{} {slope}", got.gradient[p]);
+                assert!((got.potential[p] - sum).abs() < rounding * 100.0, "{} {sum}", got.potential[p]);
+                assert!((got.gradient[p] - slope).norm() < rounding * strongest, "{} {slope}", got.gradient[p]);
             }
         }
     }
